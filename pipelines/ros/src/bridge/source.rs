@@ -1,4 +1,4 @@
-//! The stage `bridge_source`: takes what other machines send over a bridge into a live pipeline.
+//! The stage `bridge_source`: receives messages of other machines over a bridge into a live pipeline.
 
 use super::absent_senders::AbsentSenders;
 use super::certificates::Certificates;
@@ -28,38 +28,39 @@ use zenoh::liveliness::LivelinessToken;
 use zenoh::query::{Query, Queryable};
 use zenoh::{Session, Wait};
 
-/// So many batches are handled at a time.
+/// The maximum number of events handled at a time.
 const BATCHES: usize = 16;
 
 /// The parameters of `bridge_source`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SourceParameters {
-    /// The name of the bridge, which the `bridge_sink`s at its other ends have, too.
+    /// The name of the bridge, the same as that of the `bridge_sink`s at the other ends.
     pub bridge: String,
-    /// What the other ends call this one.
+    /// The name of this end.
     pub receiver: String,
-    /// The senders and routers of Zenoh to connect to, as `tcp/HOST:PORT` or `tls/HOST:PORT`. Until one answers it is looked for.
+    /// The senders and routers of Zenoh to connect to, as `tcp/HOST:PORT` or `tls/HOST:PORT`. The connection is retried until it
+    /// succeeds.
     pub connect: Vec<String>,
-    /// Where others may connect, as `tcp/HOST:PORT` or `tls/HOST:PORT`. Nothing else is listened to.
+    /// The addresses where others may connect, as `tcp/HOST:PORT` or `tls/HOST:PORT`.
     pub listen: Vec<String>,
     /// Let the other ends find this one on the local network, by multicast.
     pub discover: bool,
-    /// The authority (PEM) by which the certificates of all must be signed who connect to `tls/HOST:PORT`. Without it anybody may
-    /// who knows the authority of `certificate`.
+    /// The authority (PEM) that must have signed the certificates of all ends that connect to `tls/HOST:PORT`. Without it no
+    /// certificate is required of them.
     pub authority: Option<PathBuf>,
     /// The certificate (PEM) of this end, for `tls/HOST:PORT`, with the names by which others connect to it.
     pub certificate: Option<PathBuf>,
     /// The private key (PEM) of `certificate`.
     pub key: Option<PathBuf>,
-    /// A configuration file of Zenoh (JSON5), which stands in for `connect`, `listen`, `discover` and the certificates.
+    /// A configuration file of Zenoh (JSON5) that replaces `connect`, `listen`, `discover` and the certificates.
     pub zenoh_config: Option<PathBuf>,
-    /// Allow addresses of other machines without encryption, on a network that is trusted.
+    /// Allow addresses of other machines without encryption, on a trusted network.
     pub insecure: bool,
-    /// The times of a sender whose clock differs from the one here by more than so many seconds are corrected by that.
+    /// The clock offset of a sender beyond which its times are corrected, seconds.
     #[schemars(range(min = 0.0, max = 1e9))]
     pub clock_tolerance: f64,
-    /// When so many senders have said that nothing follows, the run ends; never if it is not given.
+    /// The number of ended senders after which the run ends; by default it never does.
     #[schemars(range(min = 1))]
     pub end_after: Option<usize>,
 }
@@ -106,14 +107,14 @@ impl Parameters for SourceParameters {
 pub fn kind() -> StageKind {
     StageKind::source(
         "bridge_source",
-        "Takes what the `bridge_sink`s of runs on other machines send into a live pipeline, over Zenoh: each message once, and those \
-         of a sender in order. Says when a sender comes, ends, or is gone, and what it has dropped",
+        "Receives the messages of `bridge_sink`s on other machines into a live pipeline, over Zenoh: each message once, and those of \
+         a sender in order. Reports when a sender connects, ends, or is gone, and what it has dropped",
         BridgeSource::new,
     )
     .live_only()
 }
 
-/// The outputs: those that every source of what robots send has, and what the senders tell of themselves.
+/// The outputs: those of every source of robots' messages, and the reports of the senders.
 pub(super) struct Ports(Vec<Port>);
 
 struct Port {
@@ -131,14 +132,14 @@ impl Outputs for Ports {
             port_type: PortType::Ros(MachineStages::NAME),
             topic: None,
             side: true,
-            summary: "what the stages of the senders' runs do; `top` shows it where something reads it, such as a log",
+            summary: "the progress of the stages of the senders' runs; `top` shows it if something reads it, such as a log",
         };
         Self(live_kind().outputs.into_iter().chain([stages]).map(port).collect())
     }
 }
 
 impl Ports {
-    /// The port of the same name and type, or else that for all other messages.
+    /// The port of the same name and type, or the one for all other messages.
     fn of(&self, link: &Link) -> Option<(usize, &Port)> {
         let ports = || self.0.iter().enumerate();
         let same = ports().find(|(_, port)| port.name == link.port && port.port_type.name() == link.ros_type);
@@ -151,26 +152,26 @@ enum Event {
     Batch(Query, i64),
 }
 
-/// Takes what senders send.
+/// The receiving end of a bridge.
 pub(super) struct BridgeSource {
     ingest: Ingest,
     events: Receiver<Event>,
-    /// What has come and was not looked at.
+    /// The received events that were not handled yet.
     waiting: VecDeque<Event>,
     key: String,
     clock: Clock,
-    /// The senders that are there.
+    /// The connected senders.
     senders: BTreeSet<Presence>,
-    /// Those that have gone without an end.
+    /// The senders that have disconnected without an end.
     absent: AbsentSenders,
-    /// The sessions of those that have said their end.
+    /// The sessions of the senders that have ended.
     ended: BTreeSet<u64>,
     end_after: Option<usize>,
-    /// Where others connect to, as words.
+    /// The addresses where others connect, as text.
     listen_text: String,
-    /// Why somebody was not let in, as far as it was told on the log.
+    /// The reasons of refused connections that were logged.
     refusals: BTreeSet<String>,
-    /// The numbers that channels have here: by port, sender, number there, and topic.
+    /// The local numbers of channels, by port, sender, number at the sender, and topic.
     channels: BTreeMap<(usize, u64, u32, String), u32>,
     _token: LivelinessToken,
     _queryable: Queryable<()>,
@@ -187,7 +188,7 @@ impl BridgeSource {
         let clock = Clock::default();
         let (to, events) = channel();
         let batches = to.clone();
-        // What comes while the stage goes is answered by nobody, and sent again to the next.
+        // A batch that arrives while the stage ends is not answered, and sent again to the next receiver.
         let take = move |query: Query| drop(batches.send(Event::Batch(query, clock.nanoseconds())));
         let queryable = session.declare_queryable(key.clone()).callback(take).wait();
         let queryable = queryable.map_err(|error| StageError::new("receive over the bridge", in_words(&error)))?;
@@ -234,16 +235,16 @@ impl BridgeSource {
             true => self.ingest.forget(sender.number),
             false => {
                 self.absent.add(sender).into_iter().for_each(|session| self.ingest.forget(session));
-                warn(output, format!("the sender `{name}` is gone, and has not said that nothing follows"));
+                warn(output, format!("the sender `{name}` is gone without having ended"));
             }
         }
     }
 
-    /// Tells whom this end has not let in. They try again and again: the log is told once.
+    /// Reports refused connections. They are retried, so each reason is logged once.
     fn note_refusals(&mut self, output: &Output<Ports>) {
         for reason in take_refusals() {
-            let text = format!("somebody was not let in at {}: {reason}", self.listen_text);
-            output.count("connections that were not let in", 1);
+            let text = format!("a connection to {} was refused: {reason}", self.listen_text);
+            output.count("refused connections", 1);
             match self.refusals.insert(reason) {
                 true => warn(output, text),
                 false => output.warn(text),
@@ -264,14 +265,14 @@ impl BridgeSource {
             output.count("senders that have ended", 1);
             self.ended.insert(taken.session);
         }
-        // What was passed on is answered, and not what has only come.
+        // A batch is acknowledged after its messages were forwarded.
         let answer = super::wire::Answer { came, answered: self.clock.nanoseconds(), ..answer };
         let answered = to_bytes(&answer).and_then(|bytes| {
             let replied = query.reply(self.key.as_str(), bytes).wait();
             replied.map_err(|error| in_words(&error))
         });
         if let Err(wrong) = answered {
-            warn(output, format!("the sender `{sender}` could not be answered: {wrong}"));
+            warn(output, format!("cannot answer the sender `{sender}`: {wrong}"));
         }
         Ok(())
     }
@@ -279,13 +280,13 @@ impl BridgeSource {
     fn tell(&self, taken: &Taken, output: &Output<Ports>) {
         let sender = &taken.sender;
         if let Some(wrong) = &taken.wrong {
-            warn(output, format!("what the sender `{sender}` has sent cannot be read: {wrong}"));
+            warn(output, format!("cannot read a batch of the sender `{sender}`: {wrong}"));
         }
         if taken.dropped > 0 {
             warn(
                 output,
                 format!(
-                    "the sender `{sender}` has dropped messages, for want of room or for later ones of their topics"
+                    "the sender `{sender}` has dropped messages, because its queue was full or later ones superseded them"
                 ),
             );
             output.count("messages that senders have dropped", taken.dropped);
@@ -315,7 +316,7 @@ impl BridgeSource {
                 output.set_log_time(header.log_time);
                 let topic = header.topic.as_str();
                 let (channel, is_announced) = match header.channel {
-                    // What a stage has made comes without a channel.
+                    // Results of stages have no channel.
                     0 => {
                         let is_announced = self.channels.contains_key(&(index, sender, 0, topic.to_owned()));
                         (self.number(index, sender, 0, topic), is_announced)
@@ -333,14 +334,14 @@ impl BridgeSource {
         }
     }
 
-    /// The number that a channel of a sender has here. Announced anew it keeps its number.
+    /// The local number of a sender's channel, which it keeps when it is announced again.
     fn number(&mut self, port: usize, sender: u64, number: u32, topic: &str) -> u32 {
         let next = u32::try_from(self.channels.len()).unwrap_or(u32::MAX - 1) + 1;
         *self.channels.entry((port, sender, number, topic.to_owned())).or_insert(next)
     }
 }
 
-/// The channel of the results of a stage. `definition` is that of their type, if it brings one.
+/// The channel of the results of a stage. `definition` is that of their type, if it is not a built-in one.
 pub(super) fn channel_of(topic: &str, ros_type: &str, definition: &str) -> Channel {
     let known = || schema_text(ros_type).unwrap_or_default();
     let schema = if definition.is_empty() { known() } else { definition.to_owned() };

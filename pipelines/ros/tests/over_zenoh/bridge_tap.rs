@@ -213,8 +213,8 @@ fn a_tap_whose_wire_is_cut_is_closed_at_the_robot_and_goes_on_when_it_is_mended(
     }
     assert_eq!(came, [1, 2, 3]);
     let warnings = tap.warnings();
-    assert!(warnings.keys().any(|text| text.contains("is lost: it is tried again")), "{warnings:?}");
-    assert_eq!(warnings["`slam.pose` is looked on at anew: messages may have been missed"], 2, "{warnings:?}");
+    assert!(warnings.keys().any(|text| text.contains("is lost: it is retried")), "{warnings:?}");
+    assert_eq!(warnings["`slam.pose` was reopened: messages may have been missed"], 2, "{warnings:?}");
     let is_told = |tap: &mut StageHarness| tap.counts().get("messages missed") == Some(&(3 * MISSED));
     assert_eq!(go_on(&mut tap, "missed", is_told), None);
     // The end of the tap.
@@ -229,7 +229,7 @@ fn a_machine_that_is_not_there_is_waited_for_and_the_end_of_its_run_is_that_of_t
     let told = |words: &'static str| move |tap: &mut StageHarness| tap.warnings().keys().any(|text| text.contains(words));
     // Nobody is there yet.
     let mut tap = tap_stage(&endpoint, "");
-    assert_eq!(go_on(&mut tap, "base", told("no machine is reached")), None);
+    assert_eq!(go_on(&mut tap, "base", told("cannot connect to any machine")), None);
     let _base = source(&endpoint, "");
     let (wire, by_wire) = Wire::new(port);
     let link = Link::default();

@@ -183,7 +183,7 @@ fn who_has_no_right_certificate_is_refused_and_both_ends_say_why() {
         };
         wait_until(words[0], is_told, || base.errors());
         assert!(told.contains(*endpoint), "{told}");
-        let at_base = format!("somebody was not let in at tls/127.0.0.1:{port}: ");
+        let at_base = format!("a connection to tls/127.0.0.1:{port} was refused: ");
         base.wait_for(&at_base);
     }
     for (.., at_base) in &refused {
@@ -199,6 +199,6 @@ fn who_has_no_right_certificate_is_refused_and_both_ends_say_why() {
     assert!(!base.errors().contains("DEBUG"), "{}", base.errors());
     let summary: serde_json::Value = serde_json::from_slice(&fs::read(folder.join("summary.json")).unwrap()).unwrap();
     let robots = &summary["stages"]["robots"];
-    assert!(robots["counts"]["connections that were not let in"].as_u64() >= Some(4), "{robots}");
+    assert!(robots["counts"]["refused connections"].as_u64() >= Some(4), "{robots}");
     assert_eq!(robots["counts"]["messages taken"], 1, "{robots}");
 }

@@ -1,4 +1,4 @@
-//! Asks a sender for what passes on a link of its run, in a thread of its own.
+//! The client of a tap: a thread that requests the messages of a link from a sender.
 
 use super::super::network::Network;
 use super::super::presence::{Presence, Role, watch};
@@ -16,57 +16,57 @@ use std::time::{Duration, Instant};
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Session, Wait};
 
-/// What was not answered for so long is asked again.
+/// The timeout of a request, after which it is repeated.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(30);
-/// So long somebody who waits does not look around.
+/// The interval at which the waiting thread checks its conditions.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
-/// So often a sender is asked that does not answer, before that is told.
+/// The maximum number of attempts to get an answer.
 const ATTEMPTS: usize = 20;
-/// So many batches wait for the reader: a slow one is asked for no more.
+/// The maximum number of pending events; while they are pending no more are requested.
 const BATCHES: usize = 2;
-/// So long a program that ends waits until the sender was told.
+/// The time that a drop waits for the thread to disconnect from the sender.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// What is tapped.
+/// The settings of a tap.
 #[derive(Clone, Debug)]
 pub(super) struct Settings {
     pub(super) network: Network,
     /// The name of the sender.
     pub(super) sender: String,
-    /// STAGE.PORT, or STAGE if it has one output only.
+    /// The link: STAGE.PORT, or STAGE if it has only one output.
     pub(super) link: String,
-    /// So long the sender may take to be found; none for ever.
+    /// The time to wait for the sender; none if unlimited.
     pub(super) wait: Option<Duration>,
 }
 
-/// What has happened.
+/// An event of a tap.
 #[derive(Debug)]
 pub(super) enum Event {
     /// The link was found.
     Found(Link),
     Passed(Vec<Passed>),
-    /// So many messages more were missed.
+    /// The number of further missed messages.
     Missed(u64),
-    /// What somebody should know.
+    /// A notice for the user.
     Notice(String),
     /// The run has ended.
     Ended,
     Failed(StageError),
 }
 
-/// A link that is tapped. It is no longer when this is dropped.
+/// A tapped link, until this is dropped.
 pub(super) struct Client {
     pub(super) events: Receiver<Event>,
     is_stopped: Arc<AtomicBool>,
-    /// Is closed when the thread ends.
+    /// Closed when the thread ends.
     thread: Receiver<()>,
 }
 
 impl Client {
-    /// Begins to tap.
+    /// Starts to tap.
     ///
     /// # Errors
-    /// There can be no further thread.
+    /// The thread cannot be started.
     pub(super) fn start(settings: Settings) -> Result<Self, StageError> {
         let (to, events) = sync_channel(BATCHES);
         let (running, thread) = sync_channel::<()>(0);
@@ -86,16 +86,16 @@ impl Client {
 impl Drop for Client {
     fn drop(&mut self) {
         self.is_stopped.store(true, Ordering::Relaxed);
-        // Who waits for room is told that there is no reader.
+        // Closing the channel wakes a thread that waits for space in it.
         self.events = sync_channel(0).1;
-        // One that is still connecting is not waited for.
+        // Do not wait for a thread that is still connecting.
         let _ = self.thread.recv_timeout(PATIENCE);
     }
 }
 
-/// Why there is nothing more to do.
+/// The reason of the end of a tap.
 enum Over {
-    /// It was stopped, or nobody reads on.
+    /// It was stopped, or its events are no longer read.
     Stopped,
     /// The run has ended.
     Ended,
@@ -113,7 +113,7 @@ struct Poller {
     settings: Settings,
     events: SyncSender<Event>,
     is_stopped: Arc<AtomicBool>,
-    /// Until when the sender must be found; none for ever, and once it was.
+    /// The time until which the sender must be found; none if unlimited, and once it was found.
     until: Option<Instant>,
     opening: u64,
     taken: u64,
@@ -129,19 +129,19 @@ impl Poller {
                 Err(over) => break over,
             };
             let over = self.tap(&session);
-            // By that the sender is told that nobody taps.
+            // Closing withdraws the token, so that the sender stops observing.
             drop(session.close().wait());
             match over {
                 Ok(()) => {
                     let others = self.settings.network.connect_text();
-                    if let Err(over) = self.notify(format!("the connection to {others} is lost: it is tried again")) {
+                    if let Err(over) = self.notify(format!("the connection to {others} is lost: it is retried")) {
                         break over;
                     }
                 }
                 Err(over) => break over,
             }
         };
-        // Where nobody listens, nobody is told.
+        // The reader may be gone.
         drop(match over {
             Over::Stopped => Ok(()),
             Over::Ended => self.events.send(Event::Ended),
@@ -165,7 +165,7 @@ impl Poller {
         self.events.send(event).map_err(|_| Over::Stopped)
     }
 
-    /// Waits a while.
+    /// Waits for the poll interval.
     fn pause(&self) -> Result<(), Over> {
         thread::sleep(POLL_INTERVAL);
         match self.is_stopped.load(Ordering::Relaxed) {
@@ -174,7 +174,7 @@ impl Poller {
         }
     }
 
-    /// Joins the network, as soon as somebody listens there.
+    /// Joins the network once something listens there.
     fn join(&self) -> Result<Session, Over> {
         let mut is_told = false;
         loop {
@@ -183,7 +183,7 @@ impl Poller {
                 Err(error) => error,
             };
             self.pause()?;
-            // To find out why takes long.
+            // Finding the reason takes long.
             if !self.is_late() && (is_told || self.until.is_some()) {
                 continue;
             }
@@ -192,12 +192,12 @@ impl Poller {
             if self.is_late() {
                 return Err(StageError::new(self.doing(), why).into());
             }
-            self.notify(format!("no machine is reached ({why}). It is tried until one is"))?;
+            self.notify(format!("cannot connect to any machine ({why}); it is retried"))?;
             is_told = true;
         }
     }
 
-    /// Taps until the connection is lost.
+    /// Taps the link until the connection is lost.
     fn tap(&mut self, session: &Session) -> Result<(), Over> {
         let (senders, bridge) = (Senders::default(), self.settings.network.bridge.clone());
         let seen = Arc::clone(&senders);
@@ -234,7 +234,7 @@ impl Poller {
             if !is_connected(session) {
                 return Ok(None);
             }
-            // Those that are there are known by the first look around.
+            // Present senders are discovered within the first interval.
             self.pause()?;
             if self.is_late() {
                 return Err(self.nobody(senders).into());
@@ -253,7 +253,7 @@ impl Poller {
         StageError::new(self.doing(), cause).of_parameter("sender")
     }
 
-    /// Taps until the sender is there no longer.
+    /// Taps the link until the sender is gone.
     fn tap_sender(
         &mut self,
         session: &Session,
@@ -278,11 +278,11 @@ impl Poller {
             let Some(answer) = self.ask_until_answered(session, sender, &request, &is_present)? else { return Ok(()) };
             if answer.opening != self.opening {
                 if self.opening != 0 {
-                    self.notify(format!("`{}` is looked on at anew: messages may have been missed", request.link))?;
+                    self.notify(format!("`{}` was reopened: messages may have been missed", request.link))?;
                 }
                 (self.opening, self.taken, missed) = (answer.opening, 0, 0);
             }
-            // What comes twice was taken.
+            // A repeated batch was taken already.
             if answer.number > self.taken {
                 self.taken = answer.number;
                 self.send(Event::Passed(answer.passed))?;
@@ -297,7 +297,7 @@ impl Poller {
         }
     }
 
-    /// Asks until there is an answer; none if the sender is there no longer.
+    /// Repeats a request until there is an answer; none if the sender is gone.
     fn ask_until_answered(
         &self,
         session: &Session,
@@ -318,18 +318,18 @@ impl Poller {
                 return Ok(None);
             }
         }
-        let error = StageError::new(self.doing(), "the machine is there, and does not answer");
-        Err(error.with_help("its `gridweave-ros` must be one that knows taps").into())
+        let error = StageError::new(self.doing(), "the machine is connected, but does not answer");
+        Err(error.with_help("its version of `gridweave-ros` must support taps").into())
     }
 
-    /// Asks once; none if no answer comes.
+    /// Sends a request; none if there is no answer.
     fn ask(&self, session: &Session, sender: &Presence, request: &Request) -> Result<Option<Answer>, Over> {
         let failed = |cause: String| StageError::new(self.doing(), cause);
         let asked = session
             .get(sender.key(&self.settings.network.bridge, Role::Sender))
             .payload(to_bytes(request).map_err(failed)?)
             .congestion_control(CongestionControl::Block)
-            // What the bridge carries goes before it, and so does its answer.
+            // The messages of the bridge have priority over taps.
             .priority(Priority::DataLow)
             .timeout(ANSWER_TIMEOUT)
             .wait();
@@ -339,7 +339,7 @@ impl Poller {
                 Ok(None) if self.is_stopped.load(Ordering::Relaxed) => return Err(Over::Stopped),
                 Ok(None) if !is_connected(session) => return Ok(None),
                 Ok(None) => {}
-                // No answer comes any more.
+                // The query has ended without an answer.
                 Err(_) => return Ok(None),
                 Ok(Some(reply)) => {
                     let Ok(sample) = reply.result() else { continue };

@@ -1,18 +1,18 @@
-//! What has passed on a link and was not asked for yet.
+//! The queue of a tapped link.
 
 use super::super::wire::{Entry, Form};
 use super::requests::Passed;
 use gridweave_runtime::message::{Message, MessageFlags};
 use std::collections::{BTreeMap, VecDeque};
 
-/// A batch takes nothing further when it has this many bytes.
+/// The maximum size of a batch with several messages, bytes.
 const BATCH_SIZE: usize = 128 * 1024;
 
-/// How much may wait; the last message does in any case. Not much: who taps wants to see what passes, and not what has passed long ago.
+/// The limits of the queue, which always keeps the last message. They are small: a tap is for current messages, not old ones.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
     pub(super) messages: usize,
-    /// Bytes of their contents.
+    /// The size of the messages, bytes.
     pub(super) bytes: usize,
 }
 
@@ -22,14 +22,14 @@ impl Default for Limits {
     }
 }
 
-/// What waits.
+/// The pending messages of a tapped link.
 #[derive(Debug, Default)]
 pub(super) struct MessageQueue {
     limits: Limits,
     entries: VecDeque<Passed>,
     messages: usize,
     bytes: usize,
-    /// What was announced, by number.
+    /// The announced channels, by number.
     channels: BTreeMap<u32, Vec<u8>>,
     dropped: u64,
 }
@@ -39,7 +39,7 @@ impl MessageQueue {
         Self { limits, ..Self::default() }
     }
 
-    /// How many messages were dropped.
+    /// The number of dropped messages.
     pub(super) fn dropped(&self) -> u64 {
         self.dropped
     }
@@ -48,7 +48,7 @@ impl MessageQueue {
         self.entries.is_empty()
     }
 
-    /// Takes what has passed. Announcements are never dropped: each channel has one.
+    /// Adds a message. Announcements are never dropped: each channel has one.
     pub(super) fn push(&mut self, message: &Message) {
         let header = message.header();
         let form = match header.flags.contains(MessageFlags::CHANNEL) {
@@ -91,7 +91,7 @@ impl MessageQueue {
         }
     }
 
-    /// Takes the next batch out: the first, and what there is room for beside it.
+    /// Removes the next batch: the first message, and further ones that fit.
     pub(super) fn batch(&mut self) -> Vec<Passed> {
         let (mut batch, mut size) = (Vec::new(), 0);
         while let Some(next) = self.entries.front()
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn what_there_is_no_room_for_is_dropped_oldest_first_but_for_announcements() {
+    fn messages_beyond_the_limits_are_dropped_oldest_first_except_announcements() {
         let mut waiting = MessageQueue::new(Limits { messages: 3, bytes: 100 });
         waiting.push(&message(0, MessageFlags::CHANNEL, 7, 10));
         for sequence in 1..6 {
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn a_batch_is_bounded_but_holds_one_message() {
+    fn a_batch_is_limited_but_has_at_least_one_message() {
         let mut waiting = MessageQueue::default();
         for (sequence, size) in
             [(1, 2 * BATCH_SIZE), (2, 10), (3, BATCH_SIZE), (4, BATCH_SIZE / 2), (5, BATCH_SIZE / 2)]

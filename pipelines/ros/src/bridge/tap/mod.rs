@@ -1,14 +1,17 @@
-//! Links of a sender's run, shown to programs that ask for them over the same network: also those that the sender does not carry.
+//! Taps: links of a sender's run that other programs observe over the same network, including links that the sender does not
+//! transport.
 //!
-//! 1. **Who asks.** A program connects as a client to where the senders connect to, and has a liveliness token as
-//!    `tapper/NAME/NUMBER`. When that is withdrawn, as when the program has died or its link is cut, the sender looks on no longer.
-//! 2. **Asking.** It asks a sender (a query of Zenoh under the sender's key) which links its run has, and then for one of them.
-//! 3. **Long polling.** The sender answers with what has passed, up to 128 KB or one message, as soon as there is something; with
-//!    nothing after a while. The program says in the next request which batch it has: the one before it is answered again, the same.
-//! 4. **Openings.** A request that builds upon what the sender does not know, as after it was started again, begins anew: with the
-//!    last message of each topic, as late readers of a link get it, and under another number of the opening.
-//! 5. **Bounds.** What waits beyond the room that there is, is dropped, the oldest first, and counted with what the sender itself
-//!    has missed of the link.
+//! 1. **Discovery.** A program connects as a client to the address that the senders connect to, and has the liveliness token
+//!    `tapper/NAME/NUMBER`. When the token is withdrawn, because the program has died or is disconnected, the sender stops
+//!    observing.
+//! 2. **Requests.** It requests the links of a sender's run (a Zenoh query under the sender's key), and then the messages of one.
+//! 3. **Long polling.** The sender answers with the pending messages, up to 128 KB or one message, as soon as there are any, or
+//!    with none after a timeout. The next request names the last received batch: if it is the one before, the last batch is sent
+//!    again.
+//! 4. **Openings.** A request whose state the sender does not know, for example after a restart, starts a new opening, with
+//!    another number: it begins with the last message of each topic, as for late joiners of a link.
+//! 5. **Limits.** Pending messages beyond the limits are dropped, the oldest first, and counted together with those that the
+//!    sender itself has missed on the link.
 
 mod server;
 mod client;

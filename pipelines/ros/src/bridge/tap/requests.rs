@@ -1,54 +1,54 @@
-//! What a program that taps and a sender say to each other.
+//! The messages between a tap and a sender.
 
 use super::super::wire::Entry;
 use serde::{Deserialize, Serialize};
 
-/// What a program asks a sender.
+/// A request of a tap.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Request {
-    /// Who asks: the number of its token.
+    /// The number of the tap's token.
     pub(super) tapper: u64,
-    /// The link, as STAGE.PORT; empty to ask which there are.
+    /// The link, as STAGE.PORT; empty to request the list of links.
     pub(super) link: String,
-    /// The opening that it goes on with; 0 for a first request.
+    /// The number of the opening to continue; 0 for a first request.
     pub(super) opening: u64,
-    /// The last batch that it has.
+    /// The number of the last received batch.
     pub(super) taken: u64,
 }
 
-/// What a sender answers.
+/// The answer of a sender.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Answer {
     pub(super) state: State,
-    /// The opening that this is of: another each time that the link is looked on at anew.
+    /// The number of the opening: another one each time that the link is opened.
     pub(super) opening: u64,
-    /// The number of the batch, from 1 on; where nothing has passed, that of the one before.
+    /// The number of the batch, from 1; without messages, the number of the previous one.
     pub(super) number: u64,
-    /// How many messages of this opening were missed so far.
+    /// The number of missed messages of this opening.
     pub(super) missed: u64,
-    /// The links that there are, if that was asked.
+    /// The list of links, if it was requested.
     pub(super) links: Vec<Link>,
-    /// What has passed.
+    /// The messages.
     pub(super) passed: Vec<Passed>,
-    /// Why it is refused, for people.
+    /// The reason of a refusal, for people.
     pub(super) text: String,
 }
 
 impl Answer {
-    /// What is said of a link: nothing has passed.
+    /// An answer without messages.
     pub(super) fn nothing(state: State, text: impl Into<String>) -> Self {
         Self { state, opening: 0, number: 0, missed: 0, links: Vec::new(), passed: Vec::new(), text: text.into() }
     }
 }
 
-/// How it stands with a link.
+/// The state of a tapped link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum State {
     /// More may follow.
     GoesOn,
-    /// The run has ended, and this is the last of it.
+    /// The run has ended, and these are the last messages.
     Ended,
-    /// It cannot be seen.
+    /// The link cannot be tapped.
     Refused,
 }
 
@@ -59,14 +59,14 @@ pub(super) struct Link {
     pub(super) output: String,
     /// The ROS 2 type of its messages; empty for any.
     pub(super) ros_type: String,
-    /// The definition of that type, if Gridweave does not know it.
+    /// The definition of that type, if it is not a built-in one.
     pub(super) definition: String,
 }
 
-/// A message that has passed, or the announcement of a channel.
+/// A message of a tapped link, or the announcement of a channel.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Passed {
-    /// Its number on the link.
+    /// Its sequence number on the link.
     pub(super) sequence: u64,
     pub(super) entry: Entry,
 }

@@ -1,4 +1,4 @@
-//! Answers those who tap, in a thread of its own, which does nothing while nobody does.
+//! The thread that answers taps, which sleeps while there are none.
 
 use super::super::presence::{Presence, Role, watch};
 use super::super::wire::{from_bytes, to_bytes};
@@ -13,9 +13,9 @@ use std::time::{Duration, Instant};
 use zenoh::query::{Query, Queryable};
 use zenoh::{Session, Wait};
 
-/// So often it is looked for messages while somebody taps.
+/// The interval at which tapped links are polled.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
-/// For so long the end of the run waits for those who tap to ask for the last of it.
+/// The time that the end of the run waits for taps to request the last messages.
 const LINGER: Duration = Duration::from_secs(2);
 
 enum Event {
@@ -24,7 +24,7 @@ enum Event {
     Stop,
 }
 
-/// Shows the links of the run that a sender is part of.
+/// The server of a sender for taps of its run's links.
 pub(in super::super) struct Taps {
     events: Sender<Event>,
     thread: Option<JoinHandle<()>>,
@@ -32,10 +32,10 @@ pub(in super::super) struct Taps {
 }
 
 impl Taps {
-    /// Begins to answer under the key of a sender.
+    /// Starts to answer requests under the key of a sender.
     ///
     /// # Errors
-    /// The session has failed, or there can be no further thread.
+    /// The session has failed, or the thread cannot be started.
     pub(in super::super) fn start(
         session: &Session,
         bridge: &str,
@@ -44,11 +44,11 @@ impl Taps {
     ) -> Result<Self, StageError> {
         let key = sender.key(bridge, Role::Sender);
         let (events, received) = channel();
-        // What comes while the thread goes is answered by nobody.
+        // A request that arrives while the thread ends is not answered.
         let asked = events.clone();
         let take = move |query: Query| drop(asked.send(Event::Asked(query)));
         let queryable = session.declare_queryable(key.clone()).callback(take).wait();
-        let queryable = queryable.map_err(|error| StageError::new("answer those who tap", in_words(&error)))?;
+        let queryable = queryable.map_err(|error| StageError::new("answer taps", in_words(&error)))?;
         let left = events.clone();
         watch(session, bridge, Role::Tapper, move |tapper, is_present| {
             if !is_present {
@@ -56,10 +56,10 @@ impl Taps {
             }
         })?;
         let thread = thread::Builder::new().name("bridge taps".to_owned());
-        // Links can be looked on at by one thread only, which begins with none.
+        // Views of links are not `Send`, so they are opened in the thread.
         let work = move || Worker { key, sessions: TapSessions::new(links, Limits::default()), events: received }.run();
         let thread = thread.spawn(work);
-        let thread = thread.map_err(|error| StageError::new("start the thread that answers those who tap", error))?;
+        let thread = thread.map_err(|error| StageError::new("start the thread that answers taps", error))?;
         Ok(Self { events, thread: Some(thread), _queryable: queryable })
     }
 }
@@ -89,7 +89,7 @@ impl Worker {
         }
     }
 
-    /// Handles what comes next, and looks on. `false` when it is to stop.
+    /// Handles the next event, and polls the links. Returns `false` when it must stop.
     fn next(&mut self) -> bool {
         let event = match self.sessions.is_idle() {
             true => self.events.recv().map_err(|_| RecvTimeoutError::Disconnected),
@@ -122,7 +122,7 @@ impl Worker {
         let replied = to_bytes(answer)
             .and_then(|bytes| query.reply(self.key.as_str(), bytes).wait().map_err(|error| in_words(&error)));
         if let Err(wrong) = replied {
-            tracing::debug!("somebody who taps could not be answered: {wrong}");
+            tracing::debug!("cannot answer a tap: {wrong}");
         }
     }
 }

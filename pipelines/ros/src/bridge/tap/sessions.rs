@@ -1,4 +1,4 @@
-//! What a sender shows of the links of its run, and to whom. It knows no network.
+//! The sessions of taps at a sender, independent of the network.
 
 use super::message_queue::{Limits, MessageQueue};
 use super::requests::{Answer, Link, Request, State};
@@ -6,57 +6,58 @@ use gridweave_runtime::stage::{LinkView, RunLinks};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-/// A request for what has passed is answered after so long where nothing has.
+/// The timeout of long polling: a request is answered after this time even without messages.
 const HOLD: Duration = Duration::from_secs(2);
-/// A link is looked on at no longer when nobody has asked for so long: longer than a program waits for an answer.
+/// The time without requests after which a link is closed: longer than a tap waits for an answer.
 const IDLE: Duration = Duration::from_secs(60);
-/// So long a stage may take to make a link, and so often it is looked whether it has.
+/// The time to wait for a stage to create its link.
 const LINK_TIMEOUT: Duration = Duration::from_secs(10);
+/// The interval at which a missing link is looked for.
 const LINK_INTERVAL: Duration = Duration::from_millis(100);
 
-/// The links that are looked on at. `R` is a way to answer a request.
+/// The tapped links. `R` is a handle with which a request is answered.
 pub(super) struct TapSessions<R> {
     links: Result<RunLinks, &'static str>,
     limits: Limits,
     openings: u64,
-    /// By tapper.
+    /// The openings by tapper.
     open: BTreeMap<u64, Opening<R>>,
     is_over: bool,
 }
 
-/// A link that is looked on at for one tapper.
+/// A link that one tapper observes.
 struct Opening<R> {
     link: usize,
     number: u64,
     view: View,
     queue: MessageQueue,
-    /// The last batch, until it is known to have come.
+    /// The last batch, until it is acknowledged.
     last: Option<Answer>,
-    /// How many batches there were.
+    /// The number of batches.
     batches: u64,
     asked: Instant,
-    /// Who waits for an answer.
+    /// The request that waits for an answer.
     asks: Option<R>,
 }
 
 enum View {
-    /// The stage has not made the link yet: since when it is waited for, and when it was looked last.
+    /// The stage has not created the link yet: when the waiting began, and when the link was looked for last.
     Awaited(Instant, Option<Instant>),
     Open(Box<dyn LinkView>),
 }
 
 impl<R> TapSessions<R> {
-    /// Shows these links, or says why it shows none.
+    /// Sessions for the given links, or with the reason why they are not available.
     pub(super) fn new(links: Result<RunLinks, &'static str>, limits: Limits) -> Self {
         Self { links, limits, openings: 0, open: BTreeMap::new(), is_over: false }
     }
 
-    /// Whether nothing is looked on at.
+    /// Whether no link is observed.
     pub(super) fn is_idle(&self) -> bool {
         self.open.is_empty()
     }
 
-    /// Somebody asks. Gives what to answer if that is known at once; otherwise [`poll`](Self::poll) will tell.
+    /// Handles a request. Returns the answer if it is known at once; otherwise [`poll`](Self::poll) returns it later.
     pub(super) fn request(&mut self, request: &Request, asks: R, now: Instant) -> Option<(R, Answer)> {
         let links = match &self.links {
             Ok(links) => links,
@@ -84,7 +85,7 @@ impl<R> TapSessions<R> {
             open.asked = now;
             return open.again(request.taken, asks);
         }
-        // What was looked on at for it before goes first: few may look on at a link.
+        // The previous opening is closed first, because a link has few observers.
         self.open.remove(&request.tapper);
         self.openings += 1;
         let opening = Opening {
@@ -101,21 +102,21 @@ impl<R> TapSessions<R> {
         None
     }
 
-    /// The tapper has gone.
+    /// Removes a tapper that has disconnected.
     pub(super) fn remove(&mut self, tapper: u64) {
         self.open.remove(&tapper);
     }
 
-    /// The run ends: what has passed so far is the last.
+    /// Ends the run: the messages so far are the last ones.
     pub(super) fn end(&mut self) {
         for open in self.open.values_mut() {
-            // What cannot be read any more is told with the last answer.
+            // A link that can no longer be read ends like the others.
             drop(open.take());
         }
         self.is_over = true;
     }
 
-    /// Takes what has passed since the last time. Gives what there is to answer.
+    /// Takes the messages since the last call. Returns the answers that are due.
     pub(super) fn poll(&mut self, now: Instant) -> Vec<(R, Answer)> {
         let Ok(links) = &self.links else { return Vec::new() };
         let is_over = self.is_over;
@@ -145,12 +146,12 @@ impl<R> TapSessions<R> {
 }
 
 impl<R> Opening<R> {
-    /// Whether a request of who has this batch can be answered.
+    /// Whether a request with this last received batch can be answered.
     fn goes_on_after(&self, taken: u64) -> bool {
         taken == self.batches || (self.last.is_some() && taken + 1 == self.batches)
     }
 
-    /// Who has all so far waits for more; who has not is given the last batch once more.
+    /// Continues with a request: it waits for more messages, or gets the last batch again if it has not received it.
     fn again(&mut self, taken: u64, asks: R) -> Option<(R, Answer)> {
         if taken == self.batches {
             self.last = None;
@@ -169,7 +170,7 @@ impl<R> Opening<R> {
                 Some(view) => self.view = View::Open(view),
                 None if now.saturating_duration_since(since) >= LINK_TIMEOUT => {
                     let seconds = LINK_TIMEOUT.as_secs();
-                    return Err(format!("the stage has not made the link within {seconds} s"));
+                    return Err(format!("the stage has not created the link within {seconds} s"));
                 }
                 None => self.view = View::Awaited(since, Some(now)),
             }

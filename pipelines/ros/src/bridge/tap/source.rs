@@ -1,4 +1,4 @@
-//! The stage `bridge_tap`: takes what passes on a link of a run on another machine.
+//! The stage `bridge_tap`: observes a link of a run on another machine.
 
 use super::super::certificates::Certificates;
 use super::super::network::{BASE, Network, is_part_of_key};
@@ -22,27 +22,27 @@ use std::time::Duration;
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct TapParameters {
-    /// The name of the bridge, as its ends have it.
+    /// The name of the bridge.
     pub(super) bridge: String,
-    /// What the machine is called: the `sender` of its `bridge_sink`, or its name.
+    /// The name of the machine: the `sender` of its `bridge_sink`, by default its host name.
     pub(super) sender: String,
-    /// The link of its run: STAGE.PORT, or STAGE if it has one output only.
+    /// The link of its run: STAGE.PORT, or STAGE if it has only one output.
     pub(super) link: String,
-    /// Where the senders connect to, which is where a `bridge_source` or a router of Zenoh listens, as `tcp/HOST:PORT` or
+    /// The addresses that the senders connect to, where a `bridge_source` or a router of Zenoh listens, as `tcp/HOST:PORT` or
     /// `tls/HOST:PORT`.
     pub(super) connect: Vec<String>,
-    /// The authority (PEM) by which the certificate of who listens there must be signed, for `tls/HOST:PORT`; without it one that
-    /// browsers know.
+    /// The authority (PEM) that must have signed the certificate of the listening end, for `tls/HOST:PORT`; the default is the
+    /// public authorities of browsers.
     pub(super) authority: Option<PathBuf>,
-    /// The certificate (PEM) of this end, where one is asked for.
+    /// The certificate (PEM) of this end, if one is required.
     pub(super) certificate: Option<PathBuf>,
     /// The private key (PEM) of `certificate`.
     pub(super) key: Option<PathBuf>,
-    /// A configuration file of Zenoh (JSON5), which stands in for `connect` and the certificates.
+    /// A configuration file of Zenoh (JSON5) that replaces `connect` and the certificates.
     pub(super) zenoh_config: Option<PathBuf>,
-    /// Allow addresses of other machines without encryption, on a network that is trusted.
+    /// Allow addresses of other machines without encryption, on a trusted network.
     pub(super) insecure: bool,
-    /// For so many seconds the machine is looked for; for ever if it is not given.
+    /// The time to wait for the machine, seconds; unlimited by default.
     #[schemars(range(min = 0.0, max = 86400.0))]
     pub(super) wait: Option<f64>,
 }
@@ -89,8 +89,8 @@ impl Parameters for TapParameters {
 pub(in super::super) fn kind() -> StageKind {
     StageKind::source(
         "bridge_tap",
-        "Takes what passes on a link of a run on another machine, whose `bridge_sink` need not send it: as `tap` shows it. It changes \
-         nothing in that run; what it is too slow for is missed, and counted",
+        "Observes a link of a run on another machine, even if the `bridge_sink` there does not send it; as the command `tap` does. It \
+         never affects that run; if it is too slow, messages are missed and counted",
         BridgeTap::new,
     )
     .live_only()
@@ -101,17 +101,17 @@ pub(super) struct Ports(Out<AnyMessage>);
 
 impl Outputs for Ports {
     fn declare(ports: &mut OutputPorts) -> Self {
-        Self(ports.any_output("messages", "what passes, under the topics that it has there"))
+        Self(ports.any_output("messages", "the messages of the link, with their original topics"))
     }
 }
 
-/// Takes what passes.
+/// Observes a link.
 struct BridgeTap {
     client: Client,
-    /// What has come and was not looked at.
+    /// The received event that was not handled yet.
     waiting: Option<Event>,
     link: Link,
-    /// The numbers that channels have here, by number there and topic.
+    /// The local numbers of channels, by their number at the sender and topic.
     channels: BTreeMap<(u32, String), u32>,
 }
 
@@ -129,14 +129,14 @@ impl BridgeTap {
 
     fn send(&mut self, passed: Passed, output: &Output<Ports>) -> Result<(), StageError> {
         let Passed { sequence, entry } = passed;
-        let unreadable = |cause: String| StageError::new("read what passes on another machine", cause);
+        let unreadable = |cause: String| StageError::new("read a message of another machine", cause);
         if entry.form == Form::Channel {
             let channel = Channel::decode(&entry.bytes).map_err(|error| unreadable(error.to_string()))?;
             return output.announce(self.number(entry.channel, "").0, &channel);
         }
         let header = entry.header().map_err(unreadable)?;
         output.set_log_time(header.log_time);
-        // What a stage has made comes without a channel.
+        // Results of stages have no channel.
         let topic = if entry.channel == 0 { entry.topic.as_str() } else { "" };
         let (channel, is_new) = self.number(entry.channel, topic);
         if is_new && entry.channel == 0 {
@@ -146,7 +146,7 @@ impl BridgeTap {
         output.send_encoded(MessageHeader { sequence, channel, ..header }, &entry.bytes)
     }
 
-    /// The number that a channel has here, and whether it has just got it.
+    /// The local number of a channel, and whether it is new.
     fn number(&mut self, number: u32, topic: &str) -> (u32, bool) {
         let next = u32::try_from(self.channels.len()).unwrap_or(u32::MAX - 1) + 1;
         let here = *self.channels.entry((number, topic.to_owned())).or_insert(next);
@@ -182,7 +182,7 @@ impl Source for BridgeTap {
             Ok(Event::Passed(passed)) => passed.into_iter().try_for_each(|passed| self.send(passed, output))?,
             Ok(Event::Missed(messages)) => {
                 output.count("messages missed", messages);
-                output.warn("messages were missed, as what taps the link was too slow for them");
+                output.warn("messages were missed, because the tap was too slow");
             }
             Ok(Event::Notice(text)) => {
                 tracing::warn!("{text}");

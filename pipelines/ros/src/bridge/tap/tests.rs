@@ -1,4 +1,4 @@
-//! A desk, with links of which the tests say what passes.
+//! Tap sessions with links whose messages the tests control.
 
 use super::message_queue::Limits;
 use super::requests::{Answer, Request, State};
@@ -204,7 +204,7 @@ fn a_link_that_is_not_made_is_looked_for_now_and_then_and_given_up() {
     assert_eq!(said(&sessions.poll(after(9000)), 1), (1, 0, vec![]));
     assert_eq!(sessions.request(&request(1, 0), 2, after(9000)), None);
     let why = refusal(sessions.poll(after(10_000)));
-    assert!(why.contains("has not made the link within 10 s"), "{why}");
+    assert!(why.contains("has not created the link within 10 s"), "{why}");
     assert!(sessions.is_idle());
 }
 
