@@ -1,12 +1,12 @@
-//! What one hop between two stages costs, by the size of the message: from the moment that the sender has written the
-//! last byte to the moment that the reader is given the message, wake-up included.
+//! The latency of one hop between two stages by message size: from the last byte written by the sender to the delivery of the
+//! message to the reader, including the wake-up.
 //!
 //!     cargo bench -p gridweave-runtime --bench hop
 //!
 //! The reference is bare iceoryx2 in the same run: the same payload, a listener, two threads. A hop that copied would
 //! grow with the size; one that does not costs the same for 64 B and 16 MiB.
 
-// A bench that cannot go on has nothing better to do than to stop.
+// A bench that fails just stops.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use gridweave_runtime::engine::{EngineKind, run};
@@ -26,7 +26,7 @@ use std::time::{Duration, Instant};
 const SIZES: [usize; 4] = [64, 64 << 10, 1 << 20, 16 << 20];
 const HOPS: u64 = 300;
 
-/// When each message was written, how many were read, and how long each hop took.
+/// The times of writing, the number of messages read, and the latencies.
 #[derive(Default)]
 struct Clock {
     written: Mutex<Option<Instant>>,
@@ -45,7 +45,7 @@ impl Clock {
         self.read.fetch_add(1, Ordering::Release);
     }
 
-    /// Waits until the reader has had `count` messages and has gone to sleep again.
+    /// Waits until the reader has received `count` messages and sleeps again.
     fn wait_for(&self, count: u64) {
         while self.read.load(Ordering::Acquire) < count {
             std::thread::yield_now();

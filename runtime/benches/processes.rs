@@ -1,11 +1,11 @@
-//! What one hop between two processes costs, by the size of the message, and how many small messages pass in a second.
+//! The latency of one hop between two processes by message size, and the throughput of small messages.
 //!
 //!     cargo bench -p gridweave-runtime --bench processes
 //!
-//! A hop is from the moment that the sender has written the last byte to the moment that the reader is given the message,
-//! its wake-up included. The reference is bare iceoryx2 between two processes in the same run: the same payload, a listener.
+//! A hop is from the last byte written by the sender to the delivery of the message to the reader, including the wake-up. The
+//! reference is bare iceoryx2 between two processes in the same run: the same payload, a listener.
 
-// A bench that cannot go on has nothing better to do than to stop.
+// A bench that fails just stops.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use gridweave_runtime::engine::processes::{Launch, run, run_process};
@@ -29,16 +29,16 @@ use std::time::Duration;
 
 const SIZES: [usize; 4] = [64, 64 << 10, 1 << 20, 16 << 20];
 const HOPS: u64 = 100;
-/// Where the system places a process decides much, and it stays there: so many are started of each kind, by turns.
+/// The number of runs of each kind, alternating: the result depends on the cores on which the kernel places the processes.
 const ROUNDS: usize = 9;
-/// Between hops, so that the reader has gone to sleep.
+/// The pause between hops, after which the reader sleeps.
 const PAUSE: Duration = Duration::from_millis(2);
 const GRID: PortType = PortType::of::<OccupancyGrid<'static>>();
 const SMALL: usize = 64;
 const MANY: u64 = 300_000;
 const DEPTH: usize = 64;
 
-/// When a message was written stands in its last bytes.
+/// The size of the time of writing in the last bytes of a message.
 fn stamp(bytes: &mut [u8]) {
     let end = bytes.len() - 8;
     bytes[end..].copy_from_slice(&monotonic_nanoseconds().to_le_bytes());
@@ -65,7 +65,7 @@ impl Times {
         self.hops.push(now.saturating_sub(written));
     }
 
-    /// How many messages were read, the median and the 99th percentile of their hops in nanoseconds, and messages a second.
+    /// The number of messages, the median and the 99th percentile of their latencies in nanoseconds, and messages per second.
     fn report(&self) -> Report {
         let mut hops = self.hops.clone();
         hops.sort_unstable();
@@ -144,7 +144,7 @@ fn registry() -> Registry {
     ])
 }
 
-/// What the reader of a pipeline of two processes reports.
+/// The report of the reader of a pipeline of two processes.
 fn pipeline(settings: &str, load: &str) -> Report {
     let port = if load.contains("pause") { "grids" } else { "small" };
     let text = format!(

@@ -1,4 +1,4 @@
-//! Every engine gives every stage the same inputs in the same order, loses nothing, and says so when a stage fails.
+//! Every engine delivers the same inputs in the same order to each stage, loses nothing, and reports a failed stage.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
@@ -13,7 +13,7 @@ use worlds::{PipelineBuilder, registry};
 
 const ENGINES: [EngineKind; 3] = [EngineKind::Single, EngineKind::Threads, EngineKind::ThreadsIpc];
 
-/// Runs a pipeline; a run that hangs fails the test.
+/// Runs a pipeline with a watchdog: a run that hangs fails the test.
 fn run_watched(pipeline: &Pipeline, engine: EngineKind) -> Result<RunReport, RunError> {
     let (sender, receiver) = mpsc::channel();
     let pipeline = pipeline.clone();
@@ -21,7 +21,7 @@ fn run_watched(pipeline: &Pipeline, engine: EngineKind) -> Result<RunReport, Run
     receiver.recv_timeout(Duration::from_secs(60)).unwrap_or_else(|_| panic!("the run on {engine} hangs"))
 }
 
-/// What the sinks of a pipeline have seen, by name.
+/// The counts of a pipeline's sinks, by name.
 fn seen(pipeline: &Pipeline, engine: EngineKind) -> Vec<(String, BTreeMap<String, u64>)> {
     let report = run_watched(pipeline, engine).unwrap_or_else(|error| panic!("{engine}: {error}"));
     report.stages.into_iter().filter(|stage| stage.kind == "recorder").map(|stage| (stage.name, stage.counts)).collect()
@@ -74,7 +74,7 @@ fn a_diamond_whose_one_side_passes_nothing_does_not_hang() {
 #[test]
 fn a_diamond_over_two_ports_of_a_source_does_not_hang_at_equal_times() {
     let mut builder = PipelineBuilder::new(registry());
-    // All messages bear one log time, so no watermark can ever release them.
+    // All messages have the same log time, so no watermark can ever release them.
     builder.stage("source", "counter", "count = 2000\nstep = 0\nboth = true", &[]);
     builder.stage("nothing", "filter", "keep_every = 0", &["source.b"]);
     builder.stage("sink", "recorder", "", &["nothing.out", "source.a"]);
@@ -119,7 +119,7 @@ fn a_map_of_17_million_cells_takes_memory_for_what_is_in_flight_only() {
     for sink in ["a", "b", "c", "d", "e", "f"] {
         builder.stage(sink, "recorder", "", &["source.a"]);
     }
-    // A place for each sample that these readers could hold would take more than 100 GB at 8 bytes a cell.
+    // Memory for every sample that these readers could borrow would be more than 100 GB at 8 bytes per cell.
     let pipeline = builder.build(64);
     let expected = seen(&pipeline, EngineKind::Single);
     for engine in [EngineKind::Threads, EngineKind::ThreadsIpc] {
@@ -211,7 +211,7 @@ fn a_failing_stage_ends_the_run_with_its_name_and_the_cause() {
 }
 
 #[test]
-fn the_other_stages_are_told_why_the_run_failed() {
+fn the_other_stages_get_the_reason_of_a_failed_run() {
     let mut builder = PipelineBuilder::new(registry());
     let path = std::env::temp_dir().join(format!("gridweave-abort-{}", std::process::id()));
     builder.stage("source", "counter", "count = 100000", &[]);

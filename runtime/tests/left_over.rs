@@ -1,4 +1,4 @@
-//! What a run leaves. This is the only test of its program, so that all that is found is of its own run.
+//! A run leaves nothing behind. This is the only test of its program, so that everything found belongs to its own run.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 

@@ -1,4 +1,4 @@
-//! Small stages, and a way to wire them, for tests of the engines.
+//! Small stages and a builder of pipelines, for tests of the engines.
 #![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used, clippy::panic)]
 
 use gridweave_runtime::message::{LogTime, Message, MessageHeader};
@@ -59,7 +59,7 @@ impl Default for TestParameters {
 
 impl Parameters for TestParameters {}
 
-/// Waits at random, to shake the order in which threads run. The waits come from a seed, and change no result.
+/// Random waits that vary the scheduling of threads. They are seeded, and must not change any result.
 struct Stall {
     most: u64,
     state: u64,
@@ -92,7 +92,7 @@ impl Outputs for Counted {
     }
 }
 
-/// What came in.
+/// The received messages.
 struct Passed(Out<AnyMessage>);
 
 impl Outputs for Passed {
@@ -210,7 +210,7 @@ impl Recorder {
     }
 }
 
-/// Writes messages in place and notes where.
+/// Writes messages in place and records their addresses.
 struct Writer {
     size: usize,
     sent: u64,
@@ -240,7 +240,7 @@ impl Source for Writer {
     }
 }
 
-/// Notes where the cells lie that it reads.
+/// Records the addresses of the cells that it reads.
 fn read(_: &mut (), grid: Received<'_, OccupancyGrid<'_>>, output: &Output<()>) -> Result<(), StageError> {
     assert!(grid.cells().iter().all(|cell| *cell == 7));
     note_place(grid.cells(), output);
@@ -283,7 +283,7 @@ pub fn registry() -> Registry {
     ])
 }
 
-/// Wires stages, each named after those that feed it.
+/// A builder of pipelines, whose stages are added after those that feed them.
 pub struct PipelineBuilder {
     registry: Registry,
     stages: Vec<StageSpec>,
