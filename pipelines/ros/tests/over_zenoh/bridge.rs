@@ -200,7 +200,7 @@ impl Wire {
         }
     }
 
-    pub(crate) fn mend(&self) {
+    pub(crate) fn restore(&self) {
         self.is_cut.store(false, Ordering::SeqCst);
     }
 }
@@ -226,7 +226,7 @@ fn a_wire_that_is_cut_again_and_again_delays_and_no_more() {
             source.warnings().iter().filter(|(text, _)| text.contains("is gone")).map(|(_, count)| *count).sum::<u64>()
         };
         wait_for(&mut source, "gone", |source| gone(source) > round as u64);
-        wire.mend();
+        wire.restore();
     }
     let is_data = |message: &Message| message.header().flags.contains(MessageFlags::DATA);
     wait_for(&mut source, "all", |source| {

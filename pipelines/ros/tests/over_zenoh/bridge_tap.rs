@@ -19,7 +19,7 @@ inputs = ["robots.tags"]
 sender = "robot-1"
 connect = ["ENDPOINT"]
 "#;
-/// So many messages are missed by each who looks on at a link of a [`robot`].
+/// So many messages are missed by each observer of a link of a [`robot`].
 const MISSED: u64 = 3;
 /// So many programs may observe a link.
 const MOST: usize = 4;
@@ -86,7 +86,7 @@ fn a_link_that_is_not_sent_is_shown_at_the_base_as_on_its_machine() {
     }
     // From elsewhere, where no run is known.
     run(GRIDWEAVE, &["tap", "robot-1:robots.pose", "--at", &endpoint, "--count", "1"], robot.path());
-    // So many look on as may. One that is killed makes room for another.
+    // The maximum number of observers. A killed one makes room for another.
     let mut taps: Vec<Running> = (0..MOST)
         .map(|number| tap(&robot, &base_name, "robot-1:robots.pose", &[], &format!("{number}.log")).0)
         .collect();
@@ -96,7 +96,7 @@ fn a_link_that_is_not_sent_is_shown_at_the_base_as_on_its_machine() {
         (tap.end().0, tap.errors())
     };
     let (status, told) = one_more();
-    assert!(status == 1 && told.contains("look on"), "{status} {told}");
+    assert!(status == 1 && told.contains("observe"), "{status} {told}");
     taps[0].signal("KILL");
     wait_until("room", || one_more().0 == 0, || base.errors());
     // An interrupt ends a tap, and the end of the run all others. Nothing keeps the run from it.
@@ -115,7 +115,7 @@ fn kind(name: &str) -> StageKind {
     gridweave_ros::kinds().into_iter().find(|kind| kind.name == name).unwrap()
 }
 
-/// What has passed on a link: log times. And who looks on.
+/// What has passed on a link: log times. And the observers.
 pub(crate) type Link = Arc<Mutex<(Vec<u64>, usize)>>;
 
 struct Viewer(Link);
@@ -187,7 +187,7 @@ pub(crate) fn times(tap: &mut StageHarness) -> Vec<u64> {
 }
 
 #[test]
-fn a_tap_whose_wire_is_cut_is_closed_at_the_robot_and_goes_on_when_it_is_mended() {
+fn a_tap_whose_wire_is_cut_is_closed_at_the_robot_and_goes_on_when_it_is_restored() {
     let (endpoint, port) = free_endpoint();
     let _base = source(&endpoint, "");
     let link = Link::default();
@@ -209,7 +209,7 @@ fn a_tap_whose_wire_is_cut_is_closed_at_the_robot_and_goes_on_when_it_is_mended(
         assert_eq!(viewers(), 1);
         wire.cut();
         assert_eq!(go_on(&mut tap, "close", |_| viewers() == 0), None);
-        wire.mend();
+        wire.restore();
     }
     assert_eq!(came, [1, 2, 3]);
     let warnings = tap.warnings();
@@ -245,7 +245,7 @@ fn a_machine_that_is_not_there_is_waited_for_and_the_end_of_its_run_is_that_of_t
     // The robot drives out of reach, and comes back.
     wire.cut();
     assert_eq!(go_on(&mut tap, "gone", told("the machine `robot-1` is gone: it is waited for")), None);
-    wire.mend();
+    wire.restore();
     pass(2);
     assert_eq!(go_on(&mut tap, "second", |tap| all_came(tap, 2)), None);
     pass(3);

@@ -39,7 +39,7 @@ inputs = ["robots.map", "robots.pose", "robots.tags"]
 
 const LINKS: [&str; 3] = ["robots.map", "robots.pose", "robots.tags"];
 const TOPICS: [&str; 3] = ["map", "pose", "tag_ranges"];
-/// A program that looks on at a link has room for so many messages, and misses others if it is slow.
+/// The buffer of an observer of a link, messages; a slow observer misses others.
 const NEVER_MISSED: usize = 60;
 
 /// A name that no run of another test has.

@@ -1,7 +1,7 @@
 //! What programs have of a map whose changes the sink publishes, over a router on this machine.
 
 use crate::stages::{give, sent, sink, source_with, wait_until_heard};
-use crate::wire::{Hearer, Robot, Router, WATCHDOG, topic};
+use crate::wire::{MapSubscriber, Robot, Router, WATCHDOG, topic};
 use gridweave_ros::qos::Qos;
 use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, OccupancyGridUpdate, RosMessage, decode, encode};
 use gridweave_runtime::stage::StageHarness;
@@ -35,7 +35,7 @@ impl Merge {
 
 /// A program that shows a map, as RViz does.
 struct Viewer {
-    hearer: Hearer,
+    subscriber: MapSubscriber,
     cells: Vec<u8>,
     /// The last whole map.
     whole: Vec<u8>,
@@ -45,19 +45,19 @@ struct Viewer {
 }
 
 impl Viewer {
-    fn start(router: &Router, name: &str, hears_updates: bool, qos: Qos) -> Self {
+    fn start(router: &Router, name: &str, receives_updates: bool, qos: Qos) -> Self {
         let robot = Robot::start(router, name);
         let (map, updates) = (topic("/map", OccupancyGrid::NAME), topic("/map_updates", OccupancyGridUpdate::NAME));
-        let hearer = match hears_updates {
+        let subscriber = match receives_updates {
             true => robot.subscribe_both([(&map, qos), (&updates, Qos::reliable(5))]),
             false => robot.subscribe(&map, qos),
         };
-        Self { hearer, cells: Vec::new(), whole: Vec::new(), heard: [0; 2], _robot: robot }
+        Self { subscriber, cells: Vec::new(), whole: Vec::new(), heard: [0; 2], _robot: robot }
     }
 
     /// Takes what has come.
     fn look(&mut self) {
-        while let Some(message) = self.hearer.try_next() {
+        while let Some(message) = self.subscriber.try_next() {
             if message.len() > CELLS {
                 self.whole = decode::<OccupancyGrid<'_>>(&message).unwrap().data.to_vec();
                 self.cells.clone_from(&self.whole);

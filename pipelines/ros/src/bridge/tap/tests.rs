@@ -16,7 +16,7 @@ struct Link {
     /// The numbers of the messages that have passed, and were not taken.
     passed: Vec<u64>,
     missed: u64,
-    /// How often it was tried to look on at it, and how many do.
+    /// The number of attempts to open it, and of its current views.
     tried: usize,
     viewers: usize,
 }
@@ -29,7 +29,7 @@ impl LinkView for Viewer {
     fn take(&mut self, take: &mut dyn FnMut(Message)) -> Result<(), StageError> {
         let mut link = self.0.lock().unwrap();
         if link.is_broken {
-            return Err(StageError::new("look on", "it is broken"));
+            return Err(StageError::new("observe", "it is broken"));
         }
         for sequence in link.passed.drain(..) {
             let header = MessageHeader { sequence, flags: MessageFlags::DATA, ..Default::default() };
@@ -49,7 +49,7 @@ impl Drop for Viewer {
     }
 }
 
-/// A desk that shows the link `slam.map` and the link `slam.pose`, of which nothing is known, and answers what it was asked by
+/// Sessions with the link `slam.map` and the link `slam.pose`, of which nothing is known, and answers what it was asked by
 /// the number of the question.
 fn sessions(limits: Limits) -> (TapSessions<u32>, SharedLink) {
     let link = Arc::new(Mutex::new(Link { is_made: true, ..Default::default() }));
