@@ -1,7 +1,7 @@
 //! What programs have of a map whose changes the sink publishes, over a router on this machine.
 
 use crate::stages::{give, sent, sink, source_with, wait_until_heard};
-use crate::wire::{MapSubscriber, Robot, Router, WATCHDOG, topic};
+use crate::wire::{TopicSubscriber, Robot, Router, WATCHDOG, topic};
 use gridweave_ros::qos::Qos;
 use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, OccupancyGridUpdate, RosMessage, decode, encode};
 use gridweave_runtime::stage::StageHarness;
@@ -35,7 +35,7 @@ impl Merge {
 
 /// A program that shows a map, as RViz does.
 struct Viewer {
-    subscriber: MapSubscriber,
+    subscriber: TopicSubscriber,
     cells: Vec<u8>,
     /// The last whole map.
     whole: Vec<u8>,

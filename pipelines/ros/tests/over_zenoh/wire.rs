@@ -109,18 +109,18 @@ impl Robot {
         Sender { publisher, gid: entity.gid(), sequence: 0, _token: token }
     }
 
-    pub(crate) fn subscribe(&self, topic: &Topic, qos: Qos) -> Hearer {
+    pub(crate) fn subscribe(&self, topic: &Topic, qos: Qos) -> TopicSubscriber {
         let (sender, messages) = channel();
         let (subscriber, token) = self.subscribe_to(topic, qos, sender);
-        Hearer { messages, _subscribers: vec![subscriber], _tokens: vec![token] }
+        TopicSubscriber { messages, _subscribers: vec![subscriber], _tokens: vec![token] }
     }
 
     /// Hears two topics, whose messages come in the order in which they have arrived.
-    pub(crate) fn subscribe_both(&self, topics: [(&Topic, Qos); 2]) -> Hearer {
+    pub(crate) fn subscribe_both(&self, topics: [(&Topic, Qos); 2]) -> TopicSubscriber {
         let (sender, messages) = channel();
         let both = topics.map(|(topic, qos)| self.subscribe_to(topic, qos, sender.clone()));
         let (subscribers, tokens) = both.into_iter().unzip();
-        Hearer { messages, _subscribers: subscribers, _tokens: tokens }
+        TopicSubscriber { messages, _subscribers: subscribers, _tokens: tokens }
     }
 
     fn subscribe_to(
@@ -182,13 +182,13 @@ impl Sender {
     }
 }
 
-pub(crate) struct Hearer {
+pub(crate) struct TopicSubscriber {
     messages: Receiver<(Option<Attachment>, Vec<u8>)>,
     _subscribers: Vec<AdvancedSubscriber<()>>,
     _tokens: Vec<LivelinessToken>,
 }
 
-impl Hearer {
+impl TopicSubscriber {
     /// The next message, which has an attachment.
     pub(crate) fn next(&self) -> Vec<u8> {
         let (attachment, message) = self.messages.recv_timeout(WATCHDOG).expect("nothing has come");
