@@ -193,8 +193,7 @@ fn look(inputs: &[Input], rules: &NameRules, robots: &RobotTopics, large: u64) -
         topic.messages += 1;
         topic.bytes += message.data.len() as u64;
         // The frames must have the names that a merge gives them.
-        let is_renamed =
-            RobotSurvey::reads(*role) && names.rename_frames(&message, &mut renamed) == Renamed::Copied;
+        let is_renamed = RobotSurvey::reads(*role) && names.rename_frames(&message, &mut renamed) == Renamed::Copied;
         survey.take(*role, robot, &topic.topic, if is_renamed { &renamed } else { message.data });
     }
     add_late_damage(&mut reader, &mut info);

@@ -12,7 +12,7 @@
 use anyhow::{Context as _, Result, bail};
 use gridweave_runtime::message::{FixedText, LogTime, Message, MessageFlags, MessageHeader};
 use gridweave_runtime::ros::{OccupancyGrid, PoseWithCovarianceStamped, RosMessage, TagRange};
-use gridweave_runtime::stage::{Context, InputWire, StageHarness, Registry};
+use gridweave_runtime::stage::{Context, InputWire, Registry, StageHarness};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

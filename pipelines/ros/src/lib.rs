@@ -16,7 +16,6 @@
 #![forbid(unsafe_code)]
 
 pub mod attachment;
-mod map_subscribers;
 pub mod bridge;
 mod changed_part;
 mod connection;
@@ -24,10 +23,11 @@ mod definitions;
 mod inbox;
 pub mod key_expression;
 pub mod liveliness;
+mod map_subscribers;
 mod map_topics;
 mod node;
-mod robot_trees;
 pub mod qos;
+mod robot_trees;
 mod settled_frames;
 pub mod sink;
 pub mod source;

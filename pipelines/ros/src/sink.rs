@@ -4,8 +4,8 @@ use super::connection::{Connection, LISTEN, ROUTER};
 use super::key_expression::Topic;
 use super::map_topics::{MapTopics, Sent};
 use super::node::{Node, Publisher};
-use super::robot_trees::{RobotTrees, in_robot_tree};
 use super::qos::Qos;
+use super::robot_trees::{RobotTrees, in_robot_tree};
 use super::settled_frames::{Change, SettledFrames};
 use gridweave_logs::names::TopicRename;
 use gridweave_logs::qos;
@@ -184,7 +184,9 @@ impl RosSink {
                 output.count("map updates published", 1);
             }
             Some(Sent::Nothing) => output.count("maps without a change, not published", 1),
-            None => output.warn(format!("maps on `{name}` were skipped: their numbers of cells do not match their sizes")),
+            None => {
+                output.warn(format!("maps on `{name}` were skipped: their numbers of cells do not match their sizes"))
+            }
         }
         Ok(())
     }

@@ -9,7 +9,7 @@ use super::liveliness::{Entity, Kind};
 use super::node::{Node, Subscriber, nanoseconds_now};
 use super::qos::Qos;
 use gridweave_logs::qos;
-use gridweave_logs::source::{LiveMessage, LiveRouter, RobotMessages};
+use gridweave_logs::source::{CellValues, LiveMessage, LiveRouter, RobotMessages};
 use gridweave_runtime::message::{Channel, LogTime};
 use gridweave_runtime::stage::{Context, Output, ParameterError, Parameters, Source, StageError, StageKind};
 use schemars::JsonSchema;
@@ -56,6 +56,8 @@ pub struct SourceParameters {
     /// The longest time that updates of a map are gathered before the map is sent with them, seconds.
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub update_period: f64,
+    /// How the values of maps' cells are read; see `mcap_source`.
+    pub map_values: CellValues,
 }
 
 impl Default for SourceParameters {
@@ -71,6 +73,7 @@ impl Default for SourceParameters {
             keep_last: 100,
             wait_for_map: 10.0,
             update_period: 1.0,
+            map_values: CellValues::default(),
         }
     }
 }
@@ -147,7 +150,7 @@ impl RosSource {
         Ok(Self {
             node,
             inbox,
-            router: LiveRouter::new(context.robots.clone(), parameters.also),
+            router: LiveRouter::new(context.robots.clone(), parameters.also, parameters.map_values),
             definitions: Definitions::new(&parameters.definitions),
             keep_last: parameters.keep_last,
             topics: BTreeMap::new(),

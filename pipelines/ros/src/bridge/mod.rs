@@ -30,12 +30,12 @@
 mod absent_senders;
 mod certificates;
 mod clock;
+mod connection_errors;
 mod difference;
 mod ingest;
 mod network;
 mod outbox;
 mod presence;
-mod connection_errors;
 mod report;
 mod sender;
 pub mod sink;
@@ -45,8 +45,8 @@ mod tap;
 mod tests;
 mod wire;
 
-use gridweave_runtime::stage::StageKind;
 pub use connection_errors::on_log_warning;
+use gridweave_runtime::stage::StageKind;
 
 /// The stage kinds of a bridge.
 pub fn kinds() -> [StageKind; 3] {

@@ -3,10 +3,10 @@
 use super::absent_senders::AbsentSenders;
 use super::certificates::Certificates;
 use super::clock::Clock;
+use super::connection_errors::take_refusals;
 use super::ingest::{Ingest, Item, Taken};
 use super::network::{BASE, Network, is_part_of_key};
 use super::presence::{Presence, Role, watch};
-use super::connection_errors::take_refusals;
 use super::report;
 use super::wire::{Link, to_bytes};
 use crate::connection::in_words;

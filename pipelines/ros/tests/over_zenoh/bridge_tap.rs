@@ -6,7 +6,7 @@ use crate::command::{GRIDWEAVE, Running, run, wait_until};
 use crate::wire::WATCHDOG;
 use gridweave_runtime::message::{FixedText, LogTime, Message, MessageFlags, MessageHeader};
 use gridweave_runtime::ros::{PoseStamped, RosMessage};
-use gridweave_runtime::stage::{Context, InputWire, LinkView, StageHarness, RunLink, RunLinks, StageError, StageKind};
+use gridweave_runtime::stage::{Context, InputWire, LinkView, RunLink, RunLinks, StageError, StageHarness, StageKind};
 use std::io::Read;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -165,7 +165,11 @@ pub(crate) fn tap_stage(endpoint: &str, more: &str) -> StageHarness {
 
 /// Lets a tap go on until this is so. Gives what was the error, if there was one.
 #[track_caller]
-pub(crate) fn go_on(tap: &mut StageHarness, what: &str, mut is_so: impl FnMut(&mut StageHarness) -> bool) -> Option<String> {
+pub(crate) fn go_on(
+    tap: &mut StageHarness,
+    what: &str,
+    mut is_so: impl FnMut(&mut StageHarness) -> bool,
+) -> Option<String> {
     let until = Instant::now() + WATCHDOG;
     while !is_so(tap) {
         assert!(Instant::now() < until, "{what}: {:?} {:?}", tap.warnings(), tap.counts());
@@ -226,7 +230,8 @@ fn a_tap_whose_wire_is_cut_is_closed_at_the_robot_and_goes_on_when_it_is_restore
 #[test]
 fn a_machine_that_is_not_there_is_waited_for_and_the_end_of_its_run_is_that_of_the_tap() {
     let (endpoint, port) = free_endpoint();
-    let told = |words: &'static str| move |tap: &mut StageHarness| tap.warnings().keys().any(|text| text.contains(words));
+    let told =
+        |words: &'static str| move |tap: &mut StageHarness| tap.warnings().keys().any(|text| text.contains(words));
     // Nobody is there yet.
     let mut tap = tap_stage(&endpoint, "");
     assert_eq!(go_on(&mut tap, "base", told("cannot connect to any machine")), None);

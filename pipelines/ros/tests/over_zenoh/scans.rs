@@ -8,7 +8,7 @@ use gridweave_runtime::ros::{
     Header, LaserEcho, LaserScan, MultiEchoLaserScan, OccupancyGrid, Odometry, PoseWithCovarianceStamped, RangeScan,
     RosMessage, TFMessage, Transform, TransformStamped, Vector3, encode,
 };
-use gridweave_runtime::stage::{Context, StageHarness, OutputEnd};
+use gridweave_runtime::stage::{Context, OutputEnd, StageHarness};
 use std::time::{Duration, Instant};
 
 fn source(router: &Router, wait_for_map: f64) -> StageHarness {

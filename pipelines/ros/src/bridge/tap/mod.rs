@@ -13,14 +13,14 @@
 //! 5. **Limits.** Pending messages beyond the limits are dropped, the oldest first, and counted together with those that the
 //!    sender itself has missed on the link.
 
-mod server;
 mod client;
-mod sessions;
+mod message_queue;
 mod requests;
+mod server;
+mod sessions;
 mod source;
 #[cfg(test)]
 mod tests;
-mod message_queue;
 
 pub(super) use server::Taps;
 pub(super) use source::kind;
