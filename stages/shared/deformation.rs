@@ -17,8 +17,8 @@ pub type Vertex = (i32, i32);
 /// Indices of the nodes at the corners of a lattice square, with their weights, which add up to 1.
 pub type Corners = [(usize, f64); 4];
 
-/// Largest distance of a node from the origin along x or y, in vertices.
-const MOST_VERTICES: f64 = 1e6;
+/// Largest distance of a node from the origin along x or y, in vertices: maps in UTM coordinates are 10,000 km from it.
+const MOST_VERTICES: f64 = 1e9;
 /// Largest number of nodes of a lattice, as their equations are solved together.
 const MOST_NODES: usize = 10_000;
 /// Largest number of its vertices, including those without a node.
@@ -286,6 +286,27 @@ mod tests {
         let cells = vec![0; 200 * 200];
         let lattice = Lattice::over(&Grid::new(geometry, &cells).unwrap(), 3.0);
         assert!((4..=MOST_NODES).contains(&lattice.len()) && lattice.spacing() > 1000.0, "{}", lattice.len());
+    }
+
+    #[test]
+    fn a_map_in_utm_coordinates_is_deformed_as_one_at_the_origin() {
+        let cells = [0; 16];
+        let grid = |x: f64, y: f64| {
+            let origin = pose(x, y, 0.0);
+            Grid::new(GridGeometry { width: 4, height: 4, resolution: 1.0, origin }, &cells).unwrap()
+        };
+        let lattice = Lattice::over(&grid(500_000.0, 4_649_776.0), 1.0);
+        assert_eq!(lattice.len(), Lattice::over(&grid(0.0, 0.0), 1.0).len());
+        let moves = vec![Vector3::new(0.1, -0.2, 0.0); lattice.len()];
+        let nodes = (0..lattice.len()).map(|number| {
+            let place = lattice.position(number);
+            DeformationNode { x: place.x, y: place.y, dx: 0.1, dy: -0.2, ..Default::default() }
+        });
+        let message = MapDeformation { spacing: 1.0, nodes: nodes.collect(), ..Default::default() };
+        let deformation = Deformation { lattice, moves };
+        assert_eq!(Deformation::from_message(&message).as_ref(), Some(&deformation));
+        let point = Point2::new(500_001.5, 4_649_778.2);
+        assert!((deformation.apply(&point) - point - Vector2::new(0.1, -0.2)).norm() < 1e-8);
     }
 
     #[test]

@@ -1,17 +1,23 @@
 use super::*;
 use crate::sink::{LogOptions, LogWriter, Outcome};
 use crate::test_log::{Folder, TestLog, layouts};
-use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage, TagRange};
+use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, PoseStamped, RosMessage, TagRange};
 
 fn reading(tag: &str) -> TagRange {
     TagRange { tag_id: tag.into(), range: 1.0, ..Default::default() }
+}
+
+/// A map without cells in a frame.
+fn map_in(frame: &str) -> OccupancyGrid<'static> {
+    let info = MapMetaData { resolution: 0.05, ..Default::default() };
+    OccupancyGrid { header: Header::new(LogTime(1), frame), info, ..Default::default() }
 }
 
 fn two_robots() -> TestLog {
     let mut log = TestLog::new(layouts()[3].clone());
     let second = 1_000_000_000;
     for robot in ["robot1", "robot2"] {
-        log.add(&format!("/{robot}/map"), OccupancyGrid::NAME, second, &OccupancyGrid::default())
+        log.add(&format!("/{robot}/map"), OccupancyGrid::NAME, second, &map_in("map"))
             .add(&format!("/{robot}/pose"), PoseStamped::NAME, 2 * second, &PoseStamped::default())
             .add(&format!("/{robot}/tag_ranges"), TagRange::NAME, 3 * second, &reading("a"))
             .add(&format!("/{robot}/tag_ranges"), TagRange::NAME, 4 * second, &reading("b"))
@@ -64,6 +70,37 @@ fn problems_for_a_merge_are_reported() {
     }
     let empty = inspect_bytes(&TestLog::new(layouts()[0].clone()).finish());
     assert_eq!(empty.problems, ["there are no messages"]);
+}
+
+#[test]
+fn maps_that_cannot_be_used_and_merged_maps_are_reported() {
+    let mut log = two_robots();
+    let unusable = OccupancyGrid { info: MapMetaData { width: 3, height: 1, ..map_in("").info }, ..map_in("map") };
+    log.add("/robot2/map", OccupancyGrid::NAME, 6_000_000_000, &unusable).add(
+        "/map_merge/map",
+        OccupancyGrid::NAME,
+        7_000_000_000,
+        &map_in("world"),
+    );
+    let info = inspect_bytes(&log.finish());
+    assert_eq!(info.robots.keys().collect::<Vec<_>>(), ["robot1", "robot2"]);
+    for problem in [
+        "1 of the maps of robot2 cannot be used: it has 0 cells, but its size is 3 x 1",
+        "maps on `/map_merge/map` are merged ones of another program, and are not used",
+    ] {
+        assert!(info.problems.iter().any(|known| known == problem), "{:?}", info.problems);
+    }
+}
+
+#[test]
+fn the_option_that_renames_topics_of_maps_is_advised() {
+    let mut log = TestLog::new(layouts()[0].clone());
+    log.add("/fleet/a/map", OccupancyGrid::NAME, 1, &map_in("a/map"));
+    log.add("/fleet/b/map", OccupancyGrid::NAME, 2, &map_in("b/map"));
+    let problems = inspect_bytes(&log.finish()).problems;
+    let advice =
+        "maps on /fleet/a/map, /fleet/b/map do not fit `/{robot}/map`: give --rename '/fleet/{robot}/map=/{robot}/map'";
+    assert_eq!(problems, [advice]);
 }
 
 #[test]

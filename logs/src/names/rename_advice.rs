@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 const ROBOT: &str = "{robot}";
 
 /// The options `--rename` that put the maps on `topics` under the names of their robots, where `pattern` is the topic that maps
-/// are expected on. Empty if every topic fits, or if the topics do not show which robots there are.
+/// are expected on. Empty if two topics fit at least, or if the topics do not show which robots there are.
 ///
 /// Topics that differ in one part are those of several robots: `/fleet/{robot}/map`. Topics of one part, such as `/map1`,
 /// `/b_map` or `/map` beside `/robot2/map`, are renamed one by one.
@@ -17,7 +17,13 @@ pub fn rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -
         topics.partition(|topic| match_robot(pattern, topic).is_some());
     // A costmap is made of a map, and is none.
     let others: Vec<&str> = others.into_iter().filter(|topic| !topic.contains("costmap")).collect();
-    if let Some(template) = common_template(&others) {
+    // Where two robots have maps that fit, further grids are not those of robots.
+    if fitting.len() > 1 {
+        return Vec::new();
+    }
+    if fitting.is_empty()
+        && let Some(template) = common_template(&others)
+    {
         return vec![format!("--rename '{template}={pattern}'")];
     }
     let mut robots: BTreeSet<String> =
@@ -115,9 +121,16 @@ mod tests {
 
     #[test]
     fn nothing_is_advised_where_topics_fit_or_show_no_robots() {
-        for topics in
-            [&["/a/map", "/b/map"][..], &["/map"], &["/grid"], &["/x/y", "/z/w"], &["/global_costmap", "/a/map"], &[]]
-        {
+        for topics in [
+            &["/a/map", "/b/map"][..],
+            &["/a/map", "/b/map", "/map"],
+            &["/a/map", "/b/map", "/a/local/map", "/b/local/map"],
+            &["/map"],
+            &["/grid"],
+            &["/x/y", "/z/w"],
+            &["/global_costmap", "/a/map"],
+            &[],
+        ] {
             assert_eq!(advice(topics), Vec::<String>::new(), "{topics:?}");
         }
     }

@@ -19,7 +19,7 @@ const BESIDE_LETHAL: i8 = 90;
 const COSTMAP_SHARE: f64 = 0.9;
 /// Two classes of values explain more of their variance than this: as much as they explain of values that are spread evenly.
 const EVEN_SPREAD: f64 = 0.75;
-/// The least difference of the means of two classes of values, if there are more than two values.
+/// The least difference of the means of two classes of values, if they are not 0 and one other value.
 const LEAST_CONTRAST: f64 = 20.0;
 
 /// How the values of cells are read.
@@ -157,8 +157,9 @@ impl Counts {
             }
         }
         let (between, [low, high, below, above]) = best?;
-        let distinct = self.0.iter().filter(|count| **count > 0).count();
-        let is_contrast = distinct == 2 || high - low >= LEAST_CONTRAST;
+        // Of 0 and one other value, 0 is free and the other occupied, however small it is.
+        let is_binary = self.0[0] > 0 && self.0.iter().filter(|count| **count > 0).count() == 2;
+        let is_contrast = is_binary || high - low >= LEAST_CONTRAST;
         (between > EVEN_SPREAD * variance && is_contrast && above < below).then_some((low, high))
     }
 }

@@ -4,6 +4,7 @@ use super::RobotMessages;
 use super::channel::{Route, Stamp};
 use super::derived::Derived;
 use super::latched::Latch;
+use crate::names::rename_advice;
 use crate::robots::{CellValues, MergedMaps, RobotChannels, Role};
 use crate::schemas::full_type_name;
 use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
@@ -180,6 +181,12 @@ impl ChannelRouter {
         Ok(Some(index))
     }
 
+    /// The topics of occupancy grids that have been seen.
+    fn grid_topics(&self) -> impl Iterator<Item = &str> {
+        let is_grid = |route: &&Route| full_type_name(&route.channel.schema_name) == OccupancyGrid::NAME;
+        self.routes.iter().filter(is_grid).map(|route| route.channel.topic.as_str())
+    }
+
     /// Warns of ports that are read and for which no message came.
     pub(super) fn warn_of_missing(&self, output: &Output<RobotMessages>) {
         let routed = |role: fn(Role) -> bool| {
@@ -187,11 +194,19 @@ impl ChannelRouter {
         };
         let builds_maps = output.scans.is_read() && routed(|role| role == Role::Scan);
         if output.map.is_read() && !builds_maps && !routed(|role| role == Role::Map) {
-            let is_map = |route: &&Route| full_type_name(&route.channel.schema_name) == OccupancyGrid::NAME;
-            let topics: Vec<_> = self.routes.iter().filter(is_map).map(|route| route.channel.topic.as_str()).collect();
-            let others =
-                if topics.is_empty() { String::new() } else { format!(" (there are maps on {})", topics.join(", ")) };
+            let others = match self.grid_topics().collect::<Vec<_>>().join(", ") {
+                topics if topics.is_empty() => topics,
+                topics => format!(" (there are maps on {topics})"),
+            };
             output.warn(format!("no map was found: no topic fits `{}`{others}", self.robots.map));
+        }
+        let advice = rename_advice(self.grid_topics(), &self.robots.map);
+        if output.map.is_read() && !builds_maps && !advice.is_empty() {
+            output.warn(format!(
+                "maps on topics that do not fit `{}` are not used: give {}",
+                self.robots.map,
+                advice.join(" ")
+            ));
         }
         if output.pose.is_read()
             && !routed(|role| matches!(role, Role::Pose(_)))

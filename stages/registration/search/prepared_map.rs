@@ -1,7 +1,7 @@
 //! A map prepared for the search.
 
 use super::{Raster, SearchRefusal, Walls};
-use crate::shared::geometry::Grid;
+use crate::shared::geometry::{Grid, is_free};
 
 /// Number of rasters of a map, each in cells twice as wide as the one before.
 const LEVELS: usize = 6;
@@ -36,7 +36,14 @@ impl PreparedMap {
         let raster = Raster::new(grid, cell.max(Self::least_cell(grid)), max_extent)
             .ok_or_else(|| SearchRefusal::TooLarge { robot: robot.to_owned(), most: max_extent })?;
         let map = Self::of_raster(raster);
-        if map.walls.is_empty() { Err(SearchRefusal::NoWalls { robot: robot.to_owned() }) } else { Ok(map) }
+        if map.walls.is_empty() {
+            return Err(SearchRefusal::NoWalls { robot: robot.to_owned() });
+        }
+        // Walls are compared from the side on which they were seen, which is that of the free space.
+        if !grid.cells.iter().any(|value| is_free(*value)) {
+            return Err(SearchRefusal::NoFreeSpace { robot: robot.to_owned() });
+        }
+        Ok(map)
     }
 
     /// A map from its finest raster.

@@ -9,6 +9,15 @@ pub enum SearchRefusal {
         /// Name of the robot.
         robot: String,
     },
+    /// A map with walls, all other cells of which are unknown.
+    #[error(
+        "the map of {robot} has walls and no free space\ntry: let its SLAM mark what its beams have passed as free (RTAB-Map: \
+         Grid/RayTracing), or give a map file whose ground is free\n\nwalls are compared from the side of the free space"
+    )]
+    NoFreeSpace {
+        /// Name of the robot.
+        robot: String,
+    },
     /// A map that would take too much time and memory.
     #[error("the known part of the map of {robot} is longer than {most:.0} m (max_extent of map_aligner)")]
     TooLarge {

@@ -1,7 +1,7 @@
 //! Maps with known relative poses, aligned.
 
 use super::{MapAlignerParameters, MapAlignment, MapAlignments, NamedMap, SearchRefusal, align_maps};
-use crate::shared::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN, pose};
+use crate::shared::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN, is_occupied, pose};
 use crate::shared::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, seen};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
@@ -220,6 +220,18 @@ fn maps_without_walls_or_without_anything_known_are_refused() {
 }
 
 #[test]
+fn a_map_with_walls_and_no_free_space_is_refused_with_that_reason() {
+    let office = FloorPlan::office().draw(all(), drawing(3.0, 2.0, 0.4));
+    let grid = office.view().grid;
+    let walls: Vec<i8> = grid.cells.iter().map(|value| if is_occupied(*value) { *value } else { UNKNOWN }).collect();
+    let walls = Grid::new(grid.geometry, &walls).unwrap();
+    for (a, b, robot) in [(walls, grid, "robot1"), (grid, walls, "robot2")] {
+        let refusal = align_grids(a, b, &MapAlignerParameters::default()).unwrap_err();
+        assert_eq!(refusal, SearchRefusal::NoFreeSpace { robot: robot.into() });
+    }
+}
+
+#[test]
 fn a_map_of_one_point_is_refused() {
     let office = FloorPlan::office().draw(all(), drawing(3.0, 2.0, 0.4));
     for around in [UNKNOWN, 0] {
@@ -228,7 +240,11 @@ fn a_map_of_one_point_is_refused() {
         let point = Grid::new(geometry, &cells).unwrap();
         for (a, b) in [(point, office.view().grid), (office.view().grid, point), (point, point)] {
             let refusal = align_grids(a, b, &MapAlignerParameters::default()).unwrap_err();
-            assert!(matches!(refusal, SearchRefusal::TooLittleInCommon { .. } | SearchRefusal::NoFit), "{refusal}");
+            let is_expected = match around {
+                UNKNOWN => matches!(refusal, SearchRefusal::NoFreeSpace { .. }),
+                _ => matches!(refusal, SearchRefusal::TooLittleInCommon { .. } | SearchRefusal::NoFit),
+            };
+            assert!(is_expected, "{refusal}");
         }
     }
 }

@@ -104,7 +104,7 @@ fn fields_that_are_not_there_are_named() {
         read(&fields(|fields| fields.range_field = Some(field))).unwrap_err()
     };
     assert!(range("distance").contains("`distance`") && range("distance").contains("distance_mm"));
-    assert!(range("a b").contains("no path"));
+    assert!(range("a b").contains("is not a field path"));
     assert!(read(&fields(|_| ())).unwrap_err().contains("is set"));
     let no_array = TagFields { each: Some("header".into()), ..fields(|fields| fields.range_field = Some("x".into())) };
     assert!(read(&no_array).unwrap_err().contains("`header` is not an array"));

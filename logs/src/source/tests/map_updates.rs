@@ -84,7 +84,7 @@ fn stages_see_whole_maps_with_the_updates_in_them() {
 #[test]
 fn updates_before_the_start_are_in_a_map_that_is_sent_at_the_start() {
     let (_folder, files) = log();
-    let mut source = read(&files, "start = 2.5\nend = 4.5");
+    let mut source = read(&files, "start = 2.5\nend = 4.5\nmap_values = 'occupancy'");
     let expected = [(2, 1, vec![0, 0, 0]), (2, 1, vec![0, 0]), (2, 2, vec![0, 0, 1]), (4, 3, vec![2, 3, 1])];
     assert_eq!(maps(&mut source), expected);
 }
