@@ -1,7 +1,7 @@
 //! The history of a live link for late joiners: the last message of each topic.
 
 use super::borrowed_samples::BorrowedSamples;
-use super::service::{HISTORY_BORROWED, HISTORY_BUFFER};
+use super::service::{HISTORY_BORROWED, HISTORY_BUFFER, MAX_TOPICS};
 use super::{LinkError, SampleHeader};
 use crate::message::{FixedText, MessageFlags, MessageHeader, Storage};
 use iceoryx2::port::subscriber::Subscriber;
@@ -11,9 +11,6 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// The maximum number of topics in the history. Further topics are not repeated, with a warning. Every reader needs buffer
-/// space for the whole history, and that is memory reserved for the largest message of the link.
-pub(super) const MAX_TOPICS: usize = 40;
 /// Messages up to this size, bytes, are copied; larger ones are borrowed.
 const LARGEST_COPIED: usize = 16 * 1024;
 

@@ -1,7 +1,6 @@
 //! The iceoryx2 service of a link, and its sizes.
 
 use super::counters::MAX_SENDERS;
-use super::history::MAX_TOPICS;
 use super::shared_memory::SharedMemory;
 use super::stage_counters::StageCounters;
 use super::{LinkError, Order, RunNames, SampleHeader};
@@ -24,6 +23,9 @@ pub(super) const OBSERVER_BUFFER: usize = 64;
 pub(super) const HISTORY_BUFFER: usize = 128;
 /// The maximum number of samples that the owner of a live link borrows.
 pub(super) const HISTORY_BORROWED: usize = 22;
+/// The maximum number of topics in the history. Further topics are not repeated, with a warning. Every reader needs buffer
+/// space for the whole history, and that is memory reserved for the largest message of the link.
+pub(super) const MAX_TOPICS: usize = 40;
 /// The initial capacity of each sample, bytes of payload.
 pub(super) const INITIAL_CAPACITY: usize = 4 * 1024;
 /// The buffer of a reader of a live link beyond its depth: for the repeated history and end, for itself and for another late

@@ -42,6 +42,7 @@
 mod call;
 mod header;
 mod interface;
+mod kind;
 mod process;
 mod source;
 mod stage;
@@ -49,5 +50,5 @@ mod stage;
 pub use call::CREDITS;
 pub use header::{CALL_VERSION, CallHeader};
 pub use interface::Interface;
+pub use kind::kind_of;
 pub use process::Launch;
-pub use stage::kind_of;

@@ -2,20 +2,9 @@
 
 use super::call::{CallError, Program};
 use super::header::{CallHeader, Reply, Request};
-use super::source::ProgramSource;
-use super::{Interface, Launch};
 use crate::message::{Message, MessageHeader};
-use crate::stage::{AnyMessage, Context, Out, Output, OutputPorts, Outputs, Parameters, StageError, StageKind};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use crate::stage::{AnyMessage, Context, Out, Output, OutputPorts, Outputs, StageError};
 use serde_json::{Map, Value, json};
-
-/// The given parameters, which are checked by the schema of the program.
-#[derive(Default, Serialize, Deserialize, JsonSchema)]
-#[serde(transparent)]
-struct Given(Map<String, Value>);
-
-impl Parameters for Given {}
 
 /// A stage whose messages a running program handles.
 pub(super) struct ProgramStage {
@@ -27,48 +16,27 @@ pub(super) struct ProgramStage {
 }
 
 /// The outputs of the interface.
-pub(super) struct Ports(Vec<Out<AnyMessage>>);
+pub(super) struct Ports(pub(super) Vec<Out<AnyMessage>>);
 
-/// [`kind_of`] declares the ports of an interface instead.
+/// [`kind_of`](super::kind_of) declares the ports of an interface instead.
 impl Outputs for Ports {
     fn declare(_: &mut OutputPorts) -> Self {
         Self(Vec::new())
     }
 }
 
-/// The stage kind `name` with the ports and parameters of `interface`, whose program `launch` starts. Errors call the program
-/// `what`. The kind is never freed.
-pub fn kind_of(name: &'static str, what: &str, interface: Interface, launch: Launch) -> &'static StageKind {
-    let Interface { summary, inputs, outputs, parameters, definitions, text } = interface;
-    let names: Vec<&'static str> = inputs.iter().map(|port| port.name).collect();
-    let what = what.to_owned();
-    let declare =
-        move |ports: &mut OutputPorts| Ports(outputs.iter().map(|port| ports.encoded_port(port.clone())).collect());
-    let make = move |Given(parameters): Given, context: &Context| {
-        let program = Program::start(&launch, context.stall_timeout)?;
-        let mut stage = ProgramStage { program, inputs: names.clone(), what: what.clone() };
-        stage.start(parameters, context, &text)?;
-        Ok(stage)
-    };
-    let kind = match inputs.is_empty() {
-        true => StageKind::source_with(name, summary, declare, move |given, context: &Context| {
-            make(given, context).map(ProgramSource::new)
-        }),
-        false => {
-            let mut builder = StageKind::stage_with(name, summary, declare, make);
-            for (index, port) in inputs.into_iter().enumerate() {
-                builder = builder.encoded_input(port, move |stage: &mut ProgramStage, message, output| {
-                    stage.receive(index, message, output)
-                });
-            }
-            builder.finish(ProgramStage::finish).abort(ProgramStage::abort).build()
-        }
-    };
-    Box::leak(Box::new(kind.with_schema(parameters).with_definitions(definitions)))
-}
-
 impl ProgramStage {
-    fn start(&mut self, parameters: Map<String, Value>, context: &Context, interface: &str) -> Result<(), StageError> {
+    /// A stage of a program that has been started; errors call it `what`.
+    pub(super) fn new(program: Program, inputs: Vec<&'static str>, what: String) -> Self {
+        Self { program, inputs, what }
+    }
+
+    pub(super) fn start(
+        &mut self,
+        parameters: Map<String, Value>,
+        context: &Context,
+        interface: &str,
+    ) -> Result<(), StageError> {
         let inputs: Vec<Value> = context
             .inputs
             .iter()
@@ -84,7 +52,7 @@ impl ProgramStage {
         started.map_err(|error| StageError::new(format!("start {}", self.what), error))
     }
 
-    fn receive(&mut self, port: usize, message: &Message, output: &Output<Ports>) -> Result<(), StageError> {
+    pub(super) fn receive(&mut self, port: usize, message: &Message, output: &Output<Ports>) -> Result<(), StageError> {
         let name = self.inputs.get(port).copied().unwrap_or_default();
         let doing = |what: &str| {
             let of_robot = if message.robot().is_empty() { String::new() } else { format!(" of {}", message.robot()) };
@@ -97,7 +65,7 @@ impl ProgramStage {
         called.map_err(|error| self.failed(error, doing))
     }
 
-    fn finish(&mut self, output: &Output<Ports>) -> Result<(), StageError> {
+    pub(super) fn finish(&mut self, output: &Output<Ports>) -> Result<(), StageError> {
         let nothing = (&MessageHeader::default(), &[][..]);
         let called = self
             .program

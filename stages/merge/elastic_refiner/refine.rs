@@ -5,8 +5,8 @@ use super::body::Body;
 use super::contacts::{Contacts, DeformedBody, contacts};
 use super::dissection::Dissection;
 use super::drift::{Drift, drift};
-use super::equations::{Equations, Solution, deformation_cost};
-use super::evidence::gain;
+use super::equations::{Equations, deformation_cost};
+use super::evidence::{Round, gain};
 use crate::shared::deformation::Deformation;
 use crate::shared::geometry::Point2;
 use nalgebra::Matrix3;
@@ -56,16 +56,6 @@ impl RefinedMap {
         let deformation = Deformation::none(self.deformation.lattice);
         Self { deformation, cost: 0.0, drift: None, ..self }
     }
-}
-
-/// Result of one round.
-pub(super) struct Round {
-    /// Contacts of the walls, for each pair of maps.
-    pub(super) walls: Vec<Contacts>,
-    /// The prior, without walls.
-    pub(super) of_deformations: Equations,
-    /// The solution of both.
-    pub(super) solution: Solution,
 }
 
 /// Deforms placed maps so that walls that several of them have are aligned. `None` if the equations have no solution,

@@ -1,9 +1,11 @@
 //! The certificates with which the ends of a bridge authenticate each other.
 
-use super::network::is_encrypted;
 use gridweave_runtime::stage::ParameterError;
 use std::fs::File;
 use std::path::{Path, PathBuf};
+
+/// The encrypted protocols of Zenoh.
+const ENCRYPTED: [&str; 2] = ["tls", "quic"];
 
 /// The certificate parameters of a stage: files in PEM.
 #[derive(Clone, Debug, Default)]
@@ -69,6 +71,11 @@ impl Certificates {
         }
         Ok(settings)
     }
+}
+
+/// Whether an endpoint is encrypted.
+pub(super) fn is_encrypted(endpoint: &str) -> bool {
+    endpoint.split_once('/').is_some_and(|(protocol, _)| ENCRYPTED.contains(&protocol))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The connection between the ends of a bridge, and its encryption.
 
-use super::certificates::Certificates;
+use super::certificates::{Certificates, is_encrypted};
 use super::connection_errors::connection_error;
 use crate::connection::{file_config, join, peer_config};
 use gridweave_runtime::stage::{ParameterError, StageError};
@@ -11,8 +11,6 @@ use zenoh::{Config, Session};
 
 /// The default address of a receiver.
 pub(super) const BASE: &str = "tcp/localhost:7448";
-/// The encrypted protocols of Zenoh.
-const ENCRYPTED: [&str; 2] = ["tls", "quic"];
 
 /// The network parameters of a stage.
 #[derive(Clone, Debug)]
@@ -169,11 +167,6 @@ fn host(endpoint: &str) -> Option<&str> {
 
 fn is_loopback(host: &str) -> bool {
     host == "localhost" || host.parse().is_ok_and(|address: IpAddr| address.is_loopback())
-}
-
-/// Whether an endpoint is encrypted.
-pub(super) fn is_encrypted(endpoint: &str) -> bool {
-    endpoint.split_once('/').is_some_and(|(protocol, _)| ENCRYPTED.contains(&protocol))
 }
 
 fn open(endpoint: &str) -> String {

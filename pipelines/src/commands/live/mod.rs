@@ -3,6 +3,7 @@
 mod bridge;
 mod bridge_settings;
 mod link_choice;
+mod message_printer;
 mod other_machines;
 mod play;
 mod record;

@@ -4,12 +4,13 @@
 //! which the `bridge_source` of a run on this machine listens.
 
 use super::bridge_settings::{bridge_kind, check, connect_parameters, settings};
-use super::running::{Running, find_run_with};
-use super::tap::{Printer, TapArgs, Types};
+use super::message_printer::{Printer, PrintingOptions, Types};
+use super::running::{RunChoice, Running, find_run_with};
 use crate::interrupt::stop_on_interrupt;
 use crate::status::{BadUse, Status};
 use crate::terminal::eprint_line;
 use anyhow::{Context as _, Result};
+use clap::Args;
 use gridweave_runtime::pipeline::{Pipeline, StageSpec};
 use gridweave_runtime::stage::{Context, Registry, StageError, StageHarness};
 use std::sync::atomic::Ordering;
@@ -23,32 +24,56 @@ const MISSED: &str = "messages missed";
 /// Interval at which interrupts are checked.
 const LOOK_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Prints messages until the run ends, the count is reached, or the user interrupts it.
-pub(super) fn tap_remote(args: &TapArgs, machine: &str, link: &str, registry: &Registry) -> Result<Status> {
+/// The connection to a run on another machine.
+#[derive(Debug, Args)]
+pub(crate) struct RemoteOptions {
+    /// The endpoint that the bridge of the other machine connects to, as tcp/HOST:PORT; by default that of a `bridge_source` here.
+    #[arg(long, value_name = "ENDPOINT")]
+    pub(crate) at: Vec<String>,
+    /// Set a parameter of the connection to the other machine; `kinds bridge_tap` lists them.
+    #[arg(long, value_name = "PARAMETER=VALUE")]
+    pub(crate) set: Vec<String>,
+}
+
+impl RemoteOptions {
+    /// Whether none is given.
+    pub(super) fn is_empty(&self) -> bool {
+        self.at.is_empty() && self.set.is_empty()
+    }
+}
+
+/// Prints messages of a link on a machine until the run ends, the count is reached, or the user interrupts it.
+pub(super) fn tap_remote(
+    (machine, link): (&str, &str),
+    remote: &RemoteOptions,
+    run: &RunChoice,
+    printing: &PrintingOptions,
+    registry: &Registry,
+) -> Result<Status> {
     let kind = bridge_kind(TAP, registry)?;
-    let set = settings(&args.set)?;
-    let has_endpoint = !args.at.is_empty() || ["connect", "zenoh_config"].iter().any(|&name| set.contains_key(name));
+    let set = settings(&remote.set)?;
+    let has_endpoint = !remote.at.is_empty() || ["connect", "zenoh_config"].iter().any(|&name| set.contains_key(name));
     let base =
         match has_endpoint {
             true => None,
             false => {
-                let running = find_run_with(&args.run, registry, |pipeline| sources(pipeline).next().is_some());
+                let running = find_run_with(run, registry, |pipeline| sources(pipeline).next().is_some());
                 Some(running.context(
                     "the endpoint that other machines connect to is not known: give it as `--at tcp/HOST:PORT`",
                 )?)
             }
         };
-    let mut parameters = base.as_ref().map_or_else(|| Ok(connect_parameters(&args.at)), base_endpoint)?;
+    let mut parameters = base.as_ref().map_or_else(|| Ok(connect_parameters(&remote.at)), base_endpoint)?;
     parameters.insert("sender".into(), machine.into());
     parameters.insert("link".into(), link.into());
-    parameters.insert("wait".into(), args.run.wait.into());
+    parameters.insert("wait".into(), run.wait.into());
     parameters.extend(set);
     check(kind, &parameters)?;
     let stop = stop_on_interrupt("the tap ends");
     let context = Context { stage: "tap".to_owned(), ..Default::default() };
     let mut stage = StageHarness::with_context(kind, &parameters.to_string(), &context)?;
     let output = kind.outputs.first().map_or("", |output| output.name);
-    let mut printer = Printer::new(args, Types::default());
+    let mut printer = Printer::new(printing, Types::default());
     loop {
         let base_has_ended = base.as_ref().is_some_and(|base| !base.run.is_running());
         let is_last_look = stop.load(Ordering::Relaxed) || base_has_ended;
@@ -153,15 +178,11 @@ mod tests {
 
     #[test]
     fn the_error_of_a_program_without_a_bridge_names_the_one_that_has_it() {
-        let args = TapArgs {
-            link: "robot1:slam.map".to_owned(),
-            json: false,
-            count: None,
-            at: Vec::new(),
-            set: Vec::new(),
-            run: Default::default(),
-        };
-        let error = super::super::tap::tap(&args, &Registry::default()).unwrap_err().to_string();
+        let remote = RemoteOptions { at: Vec::new(), set: Vec::new() };
+        let printing = PrintingOptions { json: false, count: None };
+        let link = ("robot1", "slam.map");
+        let run = RunChoice::default();
+        let error = tap_remote(link, &remote, &run, &printing, &Registry::default()).unwrap_err().to_string();
         assert!(error.contains("gridweave-ros"), "{error}");
     }
 }
