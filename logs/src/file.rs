@@ -150,6 +150,10 @@ impl OutputFile {
     /// Renames the part to the file, replacing an existing file. Returns the file, still locked.
     pub(crate) fn put_in_place(mut self) -> Result<File, WriteError> {
         let put = || {
+            if !is_at(&self.file, &self.part) {
+                let text = format!("another program has removed or replaced {} meanwhile", self.part.display());
+                return Err(io::Error::other(text));
+            }
             if self.place.exists() {
                 // After a power failure one of the two files exists.
                 self.file.sync_data()?;
@@ -199,8 +203,13 @@ fn places(path: &Path) -> Result<(PathBuf, PathBuf), WriteError> {
     match fs::symlink_metadata(&place) {
         Ok(metadata) if metadata.is_dir() => return Err(of_path(ErrorKind::IsADirectory.into())),
         Ok(metadata) if !metadata.is_file() => return Err(WriteError::NotRegular { path: path.to_owned() }),
-        // A read-only file must not be replaced either.
-        Ok(_) => drop(options().open(&place).map_err(of_path)?),
+        // A read-only file must not be replaced either, nor one that a running program has locked: the part of another output.
+        Ok(_) => {
+            let file = options().open(&place).map_err(of_path)?;
+            if matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
+                return Err(WriteError::InUse { path: path.to_owned(), writer: writer_of(&file) });
+            }
+        }
         Err(error) if error.kind() != ErrorKind::NotFound => return Err(of_path(error)),
         Err(_) => {}
     }
@@ -289,6 +298,23 @@ mod tests {
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(fs::read_to_string(&path).unwrap(), "through the link");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
+    }
+
+    #[test]
+    fn the_part_of_a_running_writer_is_not_written_as_a_file_of_its_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        let output = OutputFile::create(&path).unwrap();
+        let part = folder.path().join("a.part");
+        for refused in [replace(&[(&part, b"other")]), check_writable(&part)] {
+            assert!(matches!(refused, Err(WriteError::InUse { .. })), "{refused:?}");
+        }
+        // What replaces it all the same is not taken for the own part.
+        fs::remove_file(&part).unwrap();
+        fs::write(&part, "other").unwrap();
+        let error = output.put_in_place().unwrap_err().to_string();
+        assert!(error.contains("removed or replaced"), "{error}");
+        assert!(!path.exists());
     }
 
     #[test]

@@ -16,6 +16,10 @@ use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// The longest path of the folder of a user, bytes. iceoryx2 takes paths of 255 bytes, and 145 of them may be those of a file in
+/// the folder of a run: its prefix twice, the number of a node, and the hash of a service.
+const LONGEST_PATH: usize = 110;
+
 /// The name of the file with the pipeline of the run.
 const PIPELINE: &str = "pipeline.toml";
 
@@ -51,6 +55,13 @@ impl RunFolder {
     }
 
     fn create_in(parent: &Path) -> Result<Self, RunFolderError> {
+        if parent.as_os_str().len() > LONGEST_PATH {
+            let text = format!(
+                "its path is longer than {LONGEST_PATH} bytes, so that names of files in it would be too long; set XDG_RUNTIME_DIR \
+                 to a folder with a shorter path"
+            );
+            return Err(failed("use the folder", parent)(io::Error::new(ErrorKind::InvalidFilename, text)));
+        }
         user_folder::make(parent).map_err(failed("use the folder", parent))?;
         loop {
             let prefix = new_prefix().map_err(failed("name a run in", parent))?;
@@ -271,6 +282,15 @@ mod tests {
     // A folder of its own, separate from the runs of other tests and their cleanup.
     fn user_folder() -> tempfile::TempDir {
         tempfile::Builder::new().permissions(fs::Permissions::from_mode(OWN_FOLDER)).tempdir().unwrap()
+    }
+
+    #[test]
+    fn a_folder_with_a_path_that_is_too_long_is_refused_with_what_would_fix_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let long = folder.path().join("x".repeat(LONGEST_PATH));
+        let error = RunFolder::create_in(&long).unwrap_err().to_string();
+        assert!(error.contains("XDG_RUNTIME_DIR") && error.contains("110 bytes"), "{error}");
+        assert!(!long.exists());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A stage with its links over shared memory: receives, handles, sends, sleeps.
 
 use super::links::Links;
-use super::runner::Runner;
+use super::runner::{Runner, panic_text};
 use super::statistics::run_statistics;
 use super::work_timer::WorkTimer;
 use super::{Failure, StageReport};
@@ -12,7 +12,8 @@ use crate::link::{StageCounter, StageCounters, StageState, WireCounter, monotoni
 use crate::message::{LogTime, MessageFlags};
 use crate::stage::Context;
 use iceoryx2::service::Service;
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, OnceLock};
@@ -66,12 +67,22 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         stop_reason: &OnceLock<String>,
         events: &'a Sender<Event>,
     ) {
-        match Self::connect(links, stage, control, events) {
-            Ok(thread) => thread.run(stop_reason),
-            Err(failure) => {
+        let has_ended = Cell::new(false);
+        let end = |result: Result<StageReport, Failure>| {
+            if result.is_err() {
                 links.counters.stage(stage).clear();
-                send_event(events, Event::Ended { stage, result: Err(failure) });
             }
+            if !has_ended.replace(true) {
+                send_event(events, Event::Ended { stage, result });
+            }
+        };
+        let run = || match Self::connect(links, stage, control, events) {
+            Ok(thread) => thread.run(stop_reason, &end),
+            Err(failure) => end(Err(failure)),
+        };
+        // A link may panic, too. The run must hear of it: it waits for the end of every stage.
+        if let Err(panic) = catch_unwind(AssertUnwindSafe(run)) {
+            end(Err(Failure::Panic(panic_text(&*panic))));
         }
     }
 
@@ -113,20 +124,18 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
     }
 
     /// Runs the stage to its end and sends the result to the run.
-    fn run(mut self, stop_reason: &OnceLock<String>) {
-        let (events, stage) = (self.events, self.stage);
+    fn run(mut self, stop_reason: &OnceLock<String>, end: &dyn Fn(Result<StageReport, Failure>)) {
         let result = match (self.runner.is_source(), self.runner.is_external()) {
             (true, _) => self.drive_source(),
             (_, true) => self.drive_external(),
             _ => self.drive_stage(),
         };
         match result {
-            Ok(()) => send_event(events, Event::Ended { stage, result: self.close() }),
+            Ok(()) => end(self.close()),
             Err(failure) => {
-                self.counters.clear();
                 // Sent before the links are dropped, so that the errors of peers about lost links follow the cause.
                 let own_reason = failure.to_string();
-                send_event(events, Event::Ended { stage, result: Err(failure) });
+                end(Err(failure));
                 self.runner.abort(stop_reason.get().unwrap_or(&own_reason));
             }
         }

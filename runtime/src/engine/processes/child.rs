@@ -20,6 +20,10 @@ use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
+/// The time that stages have to stop once the supervisor is gone. A stage that works on a message for longer is ended with its
+/// process: nobody is left who could use its result or end it.
+const ORPHAN_GRACE: Duration = Duration::from_secs(5);
+
 /// The maximum time between two reports of a process.
 pub(super) const ALIVE_INTERVAL: Duration = Duration::from_millis(200);
 
@@ -131,7 +135,9 @@ impl Process<'_> {
                     self.control.stop(self.counters);
                     None
                 }
-                Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => None,
+                Err(RecvTimeoutError::Timeout) => None,
+                // All threads are gone, of which some have panicked without a last word: the scope passes that on.
+                Err(RecvTimeoutError::Disconnected) => return,
             };
             let awake_for = suspend_detector.check(Instant::now());
             if !hung && let Some(report) = self.hung(awake_for) {
@@ -173,5 +179,9 @@ fn read_commands(events: Sender<Event>) {
             send_event(&events, event);
         }
         send_event(&events, Event::Stop { reason: RunError::of_run(Failure::Orphaned).to_string() });
+        // So that the end of all threads of stages is noticed.
+        drop(events);
+        thread::sleep(ORPHAN_GRACE);
+        std::process::exit(1);
     });
 }
