@@ -74,7 +74,7 @@ fn an_input_that_cannot_be_used_fails_its_case() {
 fn a_stage_that_fails_fails_its_case_with_the_reason() {
     let cases = Cases::new();
     cases.stage("mcap_source/missing", "[stage]\nkind = \"mcap_source\"\nfiles = [\"/no/such/log.mcap\"]\n");
-    cases.assert_fails(&["stage `mcap_source` failed", "/no/such/log.mcap: there is no such file"]);
+    cases.assert_fails(&["stage `mcap_source` failed", "/no/such/log.mcap: no such file or folder"]);
     cases.bless().assert(1, &["stage `mcap_source` failed"]);
     let cases = Cases::new();
     cases.stage("line_extractor/empty", "");

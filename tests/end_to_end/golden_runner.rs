@@ -140,7 +140,7 @@ fn what_must_hold_is_checked_even_when_blessing() {
         Cases::four_tags(&expect(holds)).bless().assert(0, &["blessed"]);
     }
     for (wrong, says) in [
-        ("port = \"common\"\nmessages = 2", "`common` is to send 2 messages, and has sent 1"),
+        ("port = \"common\"\nmessages = 2", "`common` must send 2 messages, and has sent 1"),
         (
             "port = \"common\"\nfield = \"tags[3].tag_id\"\nequals = \"9\"",
             "tags[3].tag_id of message 0 of `common` must be \"9\", and is \"tag3\"",

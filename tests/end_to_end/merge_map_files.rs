@@ -226,7 +226,7 @@ fn what_is_in_map_files_is_shown_as_a_merge_reads_it() {
     let occupied =
         map.cells.iter().filter(|cell| **cell == 100).count() as f64 * f64::from(map.info.resolution).powi(2);
     assert!((shown[0]["occupied_m2"].as_f64().unwrap() - occupied).abs() < 1e-6, "{shown}");
-    gridweave(folder.path(), &["info", "a.yaml", "a.mcap"]).assert(1, &["a.mcap: there is no such file"]);
+    gridweave(folder.path(), &["info", "a.yaml", "a.mcap"]).assert(1, &["a.mcap: no such file or folder"]);
     gridweave(folder.path(), &["info", "missing.yaml"]).assert(1, &["missing.yaml"]);
 }
 

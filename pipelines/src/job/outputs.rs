@@ -18,7 +18,6 @@ use std::path::{Path, PathBuf};
 pub(crate) fn check(pipeline: &Pipeline, options: &RunOptions) -> Result<()> {
     let inputs = inputs(pipeline);
     let outputs = outputs(pipeline, options);
-    logs(pipeline).iter().try_for_each(|log| check_log_ending(log))?;
     for (index, output) in outputs.iter().enumerate() {
         if inputs.iter().any(|input| is_or_holds(input, output)) {
             let text = format!("{} is an input, and would be overwritten: choose another output", output.display());
@@ -33,6 +32,7 @@ pub(crate) fn check(pipeline: &Pipeline, options: &RunOptions) -> Result<()> {
             bail!("cannot write {}: there is no folder {}; make it first", output.display(), folder.display());
         }
     }
+    logs(pipeline).iter().try_for_each(|log| check_log_ending(log))?;
     // The last check, as it removes what killed runs have left.
     outputs.iter().try_for_each(|output| check_writable(output))?;
     Ok(())
