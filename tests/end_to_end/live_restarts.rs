@@ -188,7 +188,7 @@ fn a_stage_that_fails_at_start_is_tried_again_after_longer_and_longer_and_the_ru
     let run = Run::start(TROUBLED, &["--set", "middle.at_start=true"]);
     wait_until("third restart", || run.number("middle", "restarts") >= 3);
     let done = run.interrupt();
-    let waits: Vec<&str> = done.ended.stderr.lines().filter_map(|line| line.split(" again in ").nth(1)).collect();
+    let waits: Vec<&str> = done.ended.stderr.lines().filter_map(|line| line.split("; restarting in ").nth(1)).collect();
     assert!(waits.starts_with(&["0.5 s", "1.0 s", "2.0 s"]), "{:#?}", done.ended);
     done.ended.assert(1, &["stage `middle` failed: cannot start: as configured"]);
 }

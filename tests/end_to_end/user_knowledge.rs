@@ -49,7 +49,7 @@ fn a_place_that_was_listed_is_accepted_when_the_user_says_so() {
     assert!(errors[0].min(errors[1]) < 0.2 && errors[0].max(errors[1]) > 5.0, "{errors:?}");
     world.merge(&["--accept", "robot1/robot2=1"]).assert(0, &["merged 2 of 2 robots"]);
     world.merge(&["--accept", "robot2=3"]).assert(3, &["hypothesis 3 was chosen, but there are only 2"]);
-    world.merge(&["--accept", "robot7=1"]).assert(3, &["`robot7` concerns no pair of robots"]);
+    world.merge(&["--accept", "robot7=1"]).assert(3, &["`robot7` matches no pair of robots"]);
     for wrong in ["robot2", "robot2=0", "robot2=first"] {
         world.merge(&["--accept", wrong]).assert(2, &["write ROBOT=N", "ROBOT=initial"]);
     }
