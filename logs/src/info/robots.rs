@@ -114,10 +114,7 @@ impl RobotSurvey {
 
     /// Whether the messages of a role are read: for the names of frames, and for maps that cannot be used.
     pub(super) fn reads(role: Role) -> bool {
-        match role {
-            Role::Tf | Role::Odometry | Role::Map => true,
-            _ => false,
-        }
+        matches!(role, Role::Tf | Role::Odometry | Role::Map)
     }
 
     /// Adds a message of a channel with the given role, robot and topic.

@@ -69,7 +69,7 @@ impl Reading {
     /// The cell for a pixel: grey or three colours; the last of an even number of samples is the opacity.
     pub(super) fn pixel(&self, samples: &[f64], white: f64) -> i8 {
         match samples.split_last() {
-            Some((opacity, colours)) if samples.len() % 2 == 0 => self.cell(colours, Some(*opacity), white),
+            Some((opacity, colours)) if samples.len().is_multiple_of(2) => self.cell(colours, Some(*opacity), white),
             _ => self.cell(samples, None, white),
         }
     }

@@ -6,8 +6,8 @@ use std::f64::consts::SQRT_2;
 impl SkeletonGraph {
     /// Removes spurs: dead ends from corners and rough walls.
     ///
-    /// A path of length `l` from a junction with clearance `r` to an end with clearance `e` shows free space up to `l
-    /// + e` from the junction. A square corner extends to `sqrt(2) * r`, whatever the size of the room. The path is a
+    /// A path of length `l` from a junction with clearance `r` to an end with clearance `e` shows free space up to
+    /// `l + e` from the junction. A square corner extends to `sqrt(2) * r`, whatever the size of the room. The path is a
     /// spur if it extends less than `min_spur` metres beyond that. All spurs are removed at once, so that a corridor
     /// that ends between two corners ends in the middle. A junction that is left with two paths becomes a part of
     /// one, with one path an end, and with none an isolated node; then spurs are sought again, until there are none.
