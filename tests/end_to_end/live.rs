@@ -1,6 +1,7 @@
 //! Live runs: what is sent arrives, what is dropped is counted, and an interrupt loses nothing.
 use crate::support::{
-    Ended, LOG, POSES, RECEIVE, Run, TROUBLED, counts, processes, read, signal, simulate, start, wait_until,
+    Ended, LOG, LogBuilder, OUTPUT, POSES, RECEIVE, Run, TROUBLED, counts, processes, read, signal, simulate, start,
+    wait_until,
 };
 use std::fs;
 use tempfile::TempDir;
@@ -57,6 +58,20 @@ fn players_that_are_killed_leave_room_for_others_and_the_run_goes_on() {
         assert!(sent[topic] == output[topic], "{topic}");
     }
     assert_eq!(sent["/robot2/pose"].len(), output["/robot2/pose"].len());
+}
+
+#[test]
+fn the_log_that_a_run_writes_is_no_output_of_another_program_whatever_it_is_called() {
+    let run = Run::start(RECEIVE, &[]);
+    let mut log = LogBuilder::new(&run.path("other.mcap"));
+    log.pose(1.0, "robot1", 1.0, 2.0);
+    log.finish();
+    wait_until("partial log", || run.path("out.mcap.part").exists());
+    for output in [OUTPUT, "out.mcap.part"] {
+        let refused = run.command(&["convert", "other.mcap", "-o", output]).wait();
+        refused.assert(1, &["is being written by process"]);
+    }
+    run.interrupt().assert_done();
 }
 
 #[test]

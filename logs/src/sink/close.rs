@@ -29,7 +29,7 @@ pub enum CloseError {
 /// # Errors
 /// The writer is alive, the partial file is not a log, or it cannot be written.
 pub fn close_log(path: &Path, reason: &str) -> Result<Option<PathBuf>, CloseError> {
-    let Some(output) = OutputFile::of_killed(path).map_err(LogWriteError::from)? else { return Ok(None) };
+    let Some(mut output) = OutputFile::of_killed(path).map_err(LogWriteError::from)? else { return Ok(None) };
     let (file, end) = match LogFile::open(output.part()) {
         Ok(file) => match file.damage().iter().find_map(end_of_records) {
             Some(end) => (Some(file), Some(end)),
@@ -41,11 +41,11 @@ pub fn close_log(path: &Path, reason: &str) -> Result<Option<PathBuf>, CloseErro
         Err(error) => return Err(error.into()),
     };
     let closed = copy(file, output.part(), reason);
-    // While the file is locked, no other program removes it.
-    let _locked = match (closed, end) {
-        (Err(LogWriteError::NoRoom(_)), Some(end)) => close_in_place(output.part(), end, reason).map(|()| None)?,
-        (closed, _) => closed.map(Some)?,
-    };
+    match (closed, end) {
+        (Err(LogWriteError::NoRoom(_)), Some(end)) => close_in_place(output.part(), end, reason)?,
+        // As long as the file is locked, no other program removes it.
+        (closed, _) => output.set_file(closed?),
+    }
     place(output)
 }
 

@@ -255,6 +255,7 @@ fn a_map_that_is_too_long_is_refused_and_unknown_cells_do_not_count() {
     let parameters = MapAlignerParameters { max_extent: 30.0, ..Default::default() };
     let (geometry, mut cells) = filled(1000, 20, UNKNOWN);
     cells[..10].fill(100);
+    cells[10] = 0;
     let aligned = |cells: &[i8]| align_grids(office.view().grid, Grid::new(geometry, cells).unwrap(), &parameters);
     assert!(matches!(aligned(&cells), Err(SearchRefusal::TooLittleInCommon { .. } | SearchRefusal::NoFit)));
     cells[999] = 0;
