@@ -63,6 +63,11 @@ impl Node {
         (!is_connected(&self.session)).then(|| self.connection.routers())
     }
 
+    /// The ROS domain.
+    pub(crate) fn domain(&self) -> u32 {
+        self.identity.domain
+    }
+
     fn entity(&mut self, kind: Kind) -> Entity {
         let number = self.next_number;
         self.next_number += 1;

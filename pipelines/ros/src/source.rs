@@ -22,7 +22,7 @@ use zenoh::sample::Sample;
 
 /// So many events are handled at a time.
 const BATCH: usize = 64;
-/// So long a router may take to answer before somebody is told.
+/// The time that a router may take to answer before a warning.
 const PATIENCE: Duration = Duration::from_secs(3);
 
 /// The parameters of `ros_source`.
@@ -56,6 +56,9 @@ pub struct SourceParameters {
     /// The longest time that updates of a map are gathered before the map is sent with them, seconds.
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub update_period: f64,
+    /// The time without any publisher in the domain after which a warning names the likely reasons, seconds.
+    #[schemars(range(min = 0.0, max = 3600.0))]
+    pub discovery_timeout: f64,
     /// How the values of maps' cells are read; see `mcap_source`.
     pub map_values: CellValues,
 }
@@ -73,6 +76,7 @@ impl Default for SourceParameters {
             keep_last: 100,
             wait_for_map: 10.0,
             update_period: 1.0,
+            discovery_timeout: 10.0,
             map_values: CellValues::default(),
         }
     }
@@ -116,14 +120,18 @@ pub struct RosSource {
     waiting_scans: Vec<(Instant, Entity)>,
     wait_for_map: Duration,
     update_period: Duration,
+    discovery_timeout: Duration,
+    /// Whether another program has published anything.
+    has_publishers: bool,
     /// When the maps with updates were sent last.
     updates_sent: Instant,
     /// Those of the topics that are heard.
     subscribers: BTreeMap<Topic, Subscriber>,
-    /// What was told already.
-    told: BTreeSet<String>,
-    /// When it began to wait for a router; `None` once there was one.
-    waiting_since: Option<Instant>,
+    /// Warnings that were given.
+    warned: BTreeSet<String>,
+    /// Whether a router or another program has answered, and since when that has been so.
+    is_connected: bool,
+    changed: Instant,
     log_time: u64,
 }
 
@@ -157,10 +165,13 @@ impl RosSource {
             waiting_scans: Vec::new(),
             wait_for_map: duration(parameters.wait_for_map),
             update_period: duration(parameters.update_period),
+            discovery_timeout: duration(parameters.discovery_timeout),
+            has_publishers: false,
             updates_sent: Instant::now(),
             subscribers: BTreeMap::new(),
-            told: BTreeSet::new(),
-            waiting_since: Some(Instant::now()),
+            warned: BTreeSet::new(),
+            is_connected: false,
+            changed: Instant::now(),
             log_time: 0,
         })
     }
@@ -176,6 +187,7 @@ impl RosSource {
         if entity.session == self.node.session_name() {
             return Ok(());
         }
+        self.has_publishers |= is_there;
         if !is_there {
             self.waiting_scans.retain(|(_, waiting)| *waiting != entity);
             if let Some(seen) = self.topics.get_mut(&topic) {
@@ -271,7 +283,7 @@ impl RosSource {
             self.subscribers.insert(topic.clone(), subscriber);
             tracing::info!("takes messages of {} on `{}`", topic.ros_type, topic.name);
         }
-        wrong.into_iter().for_each(|wrong| self.tell_once(wrong, output));
+        wrong.into_iter().for_each(|wrong| self.warn_once(wrong, output));
         Ok(())
     }
 
@@ -314,9 +326,9 @@ impl RosSource {
         }
     }
 
-    /// Tells what is wrong at once, and counts it, but only the first time.
-    fn tell_once(&mut self, text: String, output: &Output<RobotMessages>) {
-        if self.told.insert(text.clone()) {
+    /// Warns at once, and counts the warning, but only the first time.
+    fn warn_once(&mut self, text: String, output: &Output<RobotMessages>) {
+        if self.warned.insert(text.clone()) {
             tracing::warn!("{text}");
             output.warn(text);
         }
@@ -357,22 +369,32 @@ impl RosSource {
         self.router.send(number, message, output)
     }
 
-    /// Tells once that no router answers, and that one does after all.
-    fn look_for_router(&mut self, output: &Output<RobotMessages>) {
-        let Some(since) = self.waiting_since else { return };
+    /// Warns of a router that does not answer, and of a domain in which nobody publishes.
+    fn check_connection(&mut self, output: &Output<RobotMessages>) {
+        if self.has_publishers {
+            return;
+        }
         match self.node.looks_for_router() {
-            None => {
-                self.waiting_since = None;
+            None if !self.is_connected => {
+                (self.is_connected, self.changed) = (true, Instant::now());
                 tracing::info!("connected");
             }
-            Some(routers) if since.elapsed() > PATIENCE => {
+            None if self.changed.elapsed() > self.discovery_timeout => {
+                let text = format!(
+                    "connected, but nobody publishes in the domain {}: robots on Fast DDS or Cyclone DDS are not heard, start their \
+                     nodes with RMW_IMPLEMENTATION=rmw_zenoh_cpp; or is their ROS_DOMAIN_ID another one?",
+                    self.node.domain()
+                );
+                self.warn_once(text, output);
+            }
+            Some(routers) if !self.is_connected && self.changed.elapsed() > PATIENCE => {
                 let text = format!(
                     "no Zenoh router answers at {routers}: start one with `ros2 run rmw_zenoh_cpp rmw_zenohd`, or name it in `connect`. \
                      It is looked for until it answers"
                 );
-                self.tell_once(text, output);
+                self.warn_once(text, output);
             }
-            Some(_) => {}
+            _ => {}
         }
     }
 }
@@ -385,7 +407,7 @@ impl Source for RosSource {
     }
 
     fn next(&mut self, output: &Output<RobotMessages>) -> Result<bool, StageError> {
-        self.look_for_router(output);
+        self.check_connection(output);
         self.end_waiting(output)?;
         for _ in 0..BATCH {
             match self.inbox.take() {

@@ -197,6 +197,18 @@ fn a_source_without_a_router_says_so_and_goes_on() {
 }
 
 #[test]
+fn a_domain_in_which_nobody_publishes_is_named_with_the_likely_reasons() {
+    let router = Router::start();
+    let mut source = source_with(&router, "discovery_timeout = 0.1");
+    let text = warned(&mut source, "nobody publishes");
+    assert!(text.contains("Fast DDS") && text.contains("rmw_zenoh_cpp") && text.contains("ROS_DOMAIN_ID"), "{text}");
+    let robot = Robot::start(&router, "slam_toolbox");
+    let mut maps = robot.publish(&topic("/robot1/map", OccupancyGrid::NAME), Qos::latched(1));
+    maps.send(&map("", 10));
+    assert_eq!(sent(&mut source, "map", 1).len(), 1, "it goes on");
+}
+
+#[test]
 fn the_merged_map_is_there_for_those_who_come_late_and_after_a_restart() {
     let router = Router::start();
     let viewer = Robot::start(&router, "viewer");
