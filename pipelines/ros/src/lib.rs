@@ -31,6 +31,7 @@ mod robot_trees;
 mod settled_frames;
 pub mod sink;
 pub mod source;
+mod source_parameters;
 
 use gridweave_runtime::stage::StageKind;
 
