@@ -1,6 +1,6 @@
-//! The colours that tell robots apart, in pictures and viewers alike.
+//! The colours of robots, in pictures and viewers alike.
 
-/// Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008), those that are dark enough
+/// Colours that people with any kind of colour vision distinguish (Okabe and Ito, 2008), those that are dark enough
 /// for lines on white first.
 const PALETTE: [[u8; 3]; 6] =
     [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [230, 159, 0], [86, 180, 233]];

@@ -29,7 +29,7 @@ pub fn rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -
     let mut robots: BTreeSet<String> =
         fitting.iter().filter_map(|topic| match_robot(pattern, topic)).map(str::to_owned).collect();
     let single: Vec<&str> = others.into_iter().filter(|topic| topic.matches('/').count() == 1).collect();
-    // One map alone is that of the only robot: there is nothing to tell it from.
+    // One map alone is that of the only robot: there is no other to distinguish it from.
     if robots.len() + single.len() < 2 {
         return Vec::new();
     }

@@ -17,11 +17,11 @@ pub struct TagFields {
     pub range_unit: Option<f64>,
     /// The signal strength, dBm: the distance where there is no range.
     pub rssi_field: Option<String>,
-    /// What signal strengths say of distances; there where `rssi_field` stands for the range.
+    /// The model of signal strength over distance; present where `rssi_field` replaces the range.
     pub path_loss: Option<PathLoss>,
     /// The standard deviation of the distance, in its unit.
     pub stddev_field: Option<String>,
-    /// The standard deviation of the distance where no field tells it, metres.
+    /// The standard deviation of the distance where no field holds it, metres.
     pub stddev: Option<f64>,
     /// The pose or the point at which the tag is in the frame of the message's header, metres.
     pub pose_field: Option<String>,
@@ -32,7 +32,7 @@ pub struct TagFields {
     pub bearing_unit: Option<f64>,
     /// The standard deviation of the bearing, in its unit.
     pub bearing_stddev_field: Option<String>,
-    /// The standard deviation of the bearing where no field tells it, radians.
+    /// The standard deviation of the bearing where no field holds it, radians.
     pub bearing_stddev: Option<f64>,
 }
 
@@ -49,7 +49,7 @@ pub struct PathLoss {
 }
 
 impl PathLoss {
-    /// The distance that a signal strength tells, metres, and its standard deviation to first order.
+    /// The distance at which a signal has a strength, metres, and its standard deviation to first order.
     pub fn distance(&self, rssi: f64) -> (f64, f64) {
         let distance = 10f64.powf((self.rssi_at_1m - rssi) / (10.0 * self.exponent));
         (distance, distance * std::f64::consts::LN_10 / (10.0 * self.exponent) * self.stddev)

@@ -4,7 +4,7 @@
 //! The first step of the map merger of Saeedi, Paull, Trentini, Seto and Li, "Group mapping: a topological approach to map
 //! merging for multiple robots" (IEEE Robotics and Automation Magazine, June 2014), section "Uncertain Rotation Alignment" and
 //! equation 8. In an occupancy grid of a built place the energy of the Radon transform over its angle has a peak at each
-//! direction of walls, and comes again after a quarter turn. So the two maps' energies tell the rotation up to quarter turns;
+//! direction of walls, and comes again after a quarter turn. So the two maps' energies determine the rotation up to quarter turns;
 //! of the four hypotheses one is taken by a similarity index.
 //!
 //! What the paper leaves open, and how it is decided here:

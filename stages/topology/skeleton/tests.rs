@@ -38,7 +38,7 @@ fn graph((geometry, cells): &(GridGeometry, Vec<i8>), parameters: &SkeletonParam
     skeleton_graph(&grid, parameters).map(|(graph, _)| graph).unwrap_or_default()
 }
 
-/// How many pieces cells make that hang together by sides, and by corners if so told.
+/// The number of connected components of cells, by sides, or by corners too if so asked.
 fn pieces(cells: &[u8], stride: usize, value: u8, by_corners: bool) -> usize {
     let mut is_seen = vec![false; cells.len()];
     let mut count = 0;
