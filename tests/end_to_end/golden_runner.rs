@@ -145,7 +145,7 @@ fn what_must_hold_is_checked_even_when_blessing() {
             "port = \"common\"\nfield = \"tags[3].tag_id\"\nequals = \"9\"",
             "tags[3].tag_id of message 0 of `common` must be \"9\", and is \"tag3\"",
         ),
-        ("port = \"common\"\nmessage = 5\nfield = \"tags\"\nlength = 4", "none with the number 5"),
+        ("port = \"common\"\nmessage = 5\nfield = \"tags\"\nlength = 4", "none has the number 5"),
         ("port = \"common\"\nfield = \"tags\"\nlength = 3", "must have 3 elements, and has 4"),
         ("port = \"common\"\nfield = \"tag\"\nlength = 3", "has no field `tag`; it has header"),
         ("port = \"common\"\nfield = \"tags[1].a\"\nequals = [5, 1.2]\nwithin = 0.1", "within 0.1, and is [5.0, 1.0]"),
