@@ -1,7 +1,7 @@
 //! Live runs: what is sent arrives, what is dropped is counted, and an interrupt loses nothing.
 use crate::support::{
-    Ended, LOG, LogBuilder, OUTPUT, POSES, RECEIVE, Run, TROUBLED, counts, processes, read, signal, simulate, start,
-    wait_until,
+    Ended, LOG, LogBuilder, OUTPUT, POSES, RECEIVE, Run, TROUBLED, counts, gridweave, processes, read, signal,
+    simulate, start, wait_until,
 };
 use std::fs;
 use tempfile::TempDir;
@@ -68,8 +68,8 @@ fn the_log_that_a_run_writes_is_no_output_of_another_program_whatever_it_is_call
     log.finish();
     wait_until("partial log", || run.path("out.mcap.part").exists());
     for output in [OUTPUT, "out.mcap.part"] {
-        let refused = run.command(&["convert", "other.mcap", "-o", output]).wait();
-        refused.assert(1, &["is being written by process"]);
+        let args = ["convert", "other.mcap", "-o", output];
+        gridweave(&run.path("."), &args).assert(1, &["is being written by process"]);
     }
     run.interrupt().assert_done();
 }
