@@ -212,8 +212,8 @@ fn places(path: &Path) -> Result<(PathBuf, PathBuf), WriteError> {
         Ok(_) => {
             let file = options().open(&place).map_err(of_path)?;
             if matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))
-                // A log that was left by a killed writer is rewritten while this program has it locked.
-                && process_with_lock(&file) != Some(std::process::id())
+                // A log that was left by a killed writer is rewritten while this program has it locked itself.
+                && process_with_lock(&file).is_some_and(|process| process != std::process::id())
             {
                 return Err(WriteError::InUse { path: path.to_owned(), writer: writer_of(&file) });
             }

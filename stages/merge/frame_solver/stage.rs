@@ -70,6 +70,8 @@ struct FrameSolver {
     wanted: Option<String>,
     /// All known robots, and the names of their map frames in the merged tree of frames.
     robots: BTreeSet<String>,
+    /// The robots that have sent a map that can be used.
+    mapped: BTreeSet<String>,
     /// What is wrong with the maps of robots that have sent none that can be used.
     unusable_maps: BTreeMap<String, GridError>,
     frame_ids: BTreeMap<String, String>,
@@ -89,6 +91,7 @@ impl FrameSolver {
             parameters,
             wanted: context.reference.clone(),
             robots: BTreeSet::new(),
+            mapped: BTreeSet::new(),
             unusable_maps: BTreeMap::new(),
             frame_ids: BTreeMap::new(),
             alignments: BTreeMap::new(),
@@ -116,15 +119,15 @@ impl FrameSolver {
         let is_new = self.robots.insert(robot.to_owned());
         let is_renamed = self.frame_ids.get(robot) != Some(&frame_id);
         self.frame_ids.insert(robot.to_owned(), frame_id);
-        let is_usable_at_last = match map.check() {
-            Ok(()) => self.unusable_maps.remove(robot).is_some(),
-            Err(error) if is_new => {
-                self.unusable_maps.insert(robot.to_owned(), error);
-                false
+        let has_changed = match map.check() {
+            Ok(()) => {
+                self.mapped.insert(robot.to_owned());
+                self.unusable_maps.remove(robot).is_some()
             }
+            Err(error) if !self.mapped.contains(robot) => self.unusable_maps.insert(robot.to_owned(), error).is_none(),
             Err(_) => false,
         };
-        if is_new || is_renamed || is_usable_at_last { self.solve_and_send(output) } else { Ok(()) }
+        if is_new || is_renamed || has_changed { self.solve_and_send(output) } else { Ok(()) }
     }
 
     /// An alignment changes the solution if it differs from the last one of its pair.

@@ -125,6 +125,10 @@ fn a_robot_whose_map_cannot_be_used_is_no_reference_and_has_that_as_reason() {
     assert!(!run.reason("robot1").contains("cannot be used"));
     run.map_of_resolution("robot1", "map", f32::NAN);
     assert!(!run.reason("robot1").contains("cannot be used"), "one that can be used has come before");
+    // A robot that is known by an alignment before its map.
+    run.align(&refused("robot2", "robot4", 0.1, "two tags in common"));
+    run.map_of_resolution("robot4", "map", 0.0);
+    assert!(run.reason("robot4").contains("cannot be used"));
 }
 
 #[test]
