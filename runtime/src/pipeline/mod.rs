@@ -90,7 +90,7 @@ pub use overrides::{Overrides, SettingError};
 pub use parameter_schema::{ParameterInfo, parameters_of};
 pub use settings::{DEFAULT_DEPTH, MAX_DEPTH};
 pub use single_stage::SingleStage;
-pub use text_layout::{TEXT_WIDTH, fill};
+pub use text_layout::{TEXT_WIDTH, wrap_words};
 
 use crate::stage::{Context, InitialPoses, InputWire, RobotTopics, StageKind};
 use std::time::Duration;

@@ -1,4 +1,9 @@
-//! Text wrapping and tables for a terminal.
+//! Text wrapping, by `textwrap`, and tables for a terminal.
+
+use textwrap::WordSplitter;
+use textwrap::core::{Word, break_words, display_width};
+use textwrap::word_splitters::split_words;
+use textwrap::wrap_algorithms::wrap_first_fit;
 
 /// The default line width, characters.
 pub const TEXT_WIDTH: usize = 100;
@@ -6,45 +11,44 @@ pub const TEXT_WIDTH: usize = 100;
 /// The minimum width of the last column of a table, characters; with less space it is placed below the others.
 const LEAST_COLUMN: usize = 24;
 
-/// The separators after which a word that is longer than a line is broken: those of topics, type names and lists.
-const SEPARATORS: [char; 6] = ['/', '_', '-', ',', '.', '='];
+/// A word that is longer than a line is broken behind one of these: those of topics, type names, paths and lists.
+const JOINTS: [char; 6] = ['/', '_', '-', ',', '.', '='];
 
-/// Wraps text into lines of at most `width` characters, at spaces. A word that is longer than a line is broken after the last
-/// separator that fits, or at the end of the line. Paragraphs are joined.
-pub fn fill(text: &str, width: usize) -> Vec<String> {
+/// Wraps text to lines of at most `width` columns, at spaces; line ends in it count as spaces. A word that is longer than a line
+/// is broken behind the last joint that fits, or at the end of the line.
+pub fn wrap_words(text: &str, width: usize) -> Vec<String> {
     let width = width.max(1);
-    let mut lines = vec![String::new()];
-    for mut word in text.split_whitespace() {
-        loop {
-            let last = lines.last().map_or(0, |line| line.chars().count());
-            let gap = usize::from(last > 0);
-            let length = word.chars().count();
-            if last + gap + length <= width {
-                if let Some(line) = lines.last_mut() {
-                    line.push_str(if gap > 0 { " " } else { "" });
-                    line.push_str(word);
-                }
-                break;
-            }
-            if length > width && last == 0 {
-                let (part, rest) = word.split_at(break_of(word, width));
-                lines.last_mut().into_iter().for_each(|line| line.push_str(part));
-                word = rest;
-            }
-            lines.push(String::new());
-        }
-    }
-    lines
+    let words = text.split_whitespace().map(|word| Word { whitespace: " ", ..Word::from(word) });
+    let parts: Vec<Word<'_>> = words
+        .flat_map(|word| if display_width(word.word) > width { pieces(word, width) } else { vec![word] })
+        .collect();
+    let join = |parts: &[Word<'_>]| {
+        let line: String = parts.iter().flat_map(|part| [part.word, part.whitespace]).collect();
+        line.trim_end().to_owned()
+    };
+    wrap_first_fit(&parts, &[width as f64]).into_iter().map(join).collect()
 }
 
-/// The offset at which a word that is longer than a line is broken, bytes.
-fn break_of(word: &str, width: usize) -> usize {
-    let end = word.char_indices().nth(width).map_or(word.len(), |(offset, _)| offset);
-    match word[..end].rfind(SEPARATORS) {
-        // All separators are one byte long.
-        Some(separator) => separator + 1,
-        None => end,
-    }
+/// The longest pieces of a word that fit a line.
+fn pieces(word: Word<'_>, width: usize) -> Vec<Word<'_>> {
+    let (text, whitespace) = (word.word, word.whitespace);
+    // Without the hyphens that the splitter would put at the ends of lines.
+    let parts = split_words([word], &WordSplitter::Custom(joints)).map(|part| Word { penalty: "", ..part });
+    let parts = break_words(parts, width);
+    let mut at = 0;
+    let piece = |parts: &[Word<'_>]| {
+        let start = at;
+        at += parts.iter().map(|part| part.word.len()).sum::<usize>();
+        let whitespace = if at == text.len() { whitespace } else { "" };
+        Word { whitespace, ..Word::from(&text[start..at]) }
+    };
+    wrap_first_fit(&parts, &[width as f64]).into_iter().map(piece).collect()
+}
+
+/// Byte offsets behind the joints of a word.
+fn joints(word: &str) -> Vec<usize> {
+    // All joints are one byte long.
+    word.match_indices(JOINTS).map(|(at, _)| at + 1).filter(|at| *at < word.len()).collect()
 }
 
 /// Appends `text`, wrapped at `width` and indented. Paragraphs stay separate.
@@ -53,7 +57,7 @@ pub(super) fn push_filled(page: &mut String, indent: usize, width: usize, text: 
         if number > 0 {
             page.push('\n');
         }
-        for line in fill(paragraph, width.saturating_sub(indent)).iter().filter(|line| !line.is_empty()) {
+        for line in wrap_words(paragraph, width.saturating_sub(indent)).iter().filter(|line| !line.is_empty()) {
             page.push_str(&format!("{:indent$}{line}\n", ""));
         }
     }
@@ -83,7 +87,7 @@ pub(super) fn push_table<const N: usize>(page: &mut String, indent: usize, width
             }
             (line, at) = (String::new(), indent + 4);
         }
-        for part in fill(&row[N - 1], width.saturating_sub(at)) {
+        for part in wrap_words(&row[N - 1], width.saturating_sub(at)) {
             push(&format!("{:start$}{line}{part}", "", start = if line.is_empty() { at } else { indent }));
             line.clear();
         }
@@ -94,7 +98,7 @@ pub(super) fn push_table<const N: usize>(page: &mut String, indent: usize, width
 fn fill_cells(cells: &str, width: usize) -> Vec<String> {
     match cells.trim_end().chars().count() <= width {
         true => vec![cells.to_owned()],
-        false => fill(cells, width),
+        false => wrap_words(cells, width),
     }
 }
 
@@ -114,10 +118,10 @@ mod tests {
 
     #[test]
     fn a_word_longer_than_a_line_is_broken_after_a_separator_or_at_the_end_of_the_line() {
-        assert_eq!(fill("see gridweave_msgs/msg/Alignment", 16), ["see", "gridweave_msgs/", "msg/Alignment"]);
-        assert_eq!(fill("abcdefg hi", 3), ["abc", "def", "g", "hi"]);
-        assert_eq!(fill("ööööö", 2), ["öö", "öö", "ö"]);
-        assert_eq!(fill("  ", 0), [""]);
+        assert_eq!(wrap_words("see gridweave_msgs/msg/Alignment", 16), ["see", "gridweave_msgs/", "msg/Alignment"]);
+        assert_eq!(wrap_words("abcdefg hi", 3), ["abc", "def", "g", "hi"]);
+        assert_eq!(wrap_words("ööööö", 2), ["öö", "öö", "ö"]);
+        assert_eq!(wrap_words("  ", 0), [""]);
     }
 
     #[test]
@@ -140,5 +144,17 @@ mod tests {
         assert!(table(70).lines().nth(1).unwrap().starts_with(&format!("{:35}word", "")));
         assert!(table(40).starts_with("  map  nav_msgs/msg/OccupancyGrid\n      word word"));
         table(24);
+    }
+
+    #[test]
+    fn a_word_longer_than_a_line_is_broken_behind_a_joint_or_where_the_line_ends() {
+        assert_eq!(wrap_words("nav_msgs/msg/OccupancyGrid", 14), ["nav_msgs/msg/", "OccupancyGrid"]);
+        assert_eq!(wrap_words("a abcdefgh", 5), ["a", "abcde", "fgh"]);
+    }
+
+    #[test]
+    fn wide_characters_take_two_columns() {
+        assert_eq!(wrap_words("地図 地図", 4), ["地図", "地図"]);
+        assert_eq!(wrap_words("地図 地図", 9), ["地図 地図"]);
     }
 }
