@@ -213,6 +213,7 @@ fn look(inputs: &[Input], rules: &NameRules, robots: &RobotTopics, large: u64) -
     };
     info.topics = topics.entries.into_iter().map(finished).collect();
     info.topics.sort_by(|a, b| (&a.topic, &a.type_name).cmp(&(&b.topic, &b.type_name)));
+    survey.remove_merged_maps();
     info.problems = survey.problems(&info);
     info.problems.extend(clocks);
     info.robots = survey.into_robots();

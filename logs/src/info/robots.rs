@@ -3,7 +3,7 @@
 use super::LogInfo;
 use crate::names::rename_advice;
 use crate::robots::{
-    Classified, InferredPoses, MergedMaps, PoseSource, RobotChannels, Role, TagReader, pose_with_covariance,
+    Classified, InferredPoses, MapOrigin, MergedMaps, PoseSource, RobotChannels, Role, TagReader, pose_with_covariance,
 };
 use crate::schemas::full_type_name;
 use crate::tf::{TfPoses, is_static};
@@ -58,6 +58,8 @@ pub(super) struct RobotSurvey {
     /// By robot: what is wrong with the first map that cannot be used, and how many such maps there are.
     unusable_maps: BTreeMap<String, (GridError, u64)>,
     merged_maps: MergedMaps,
+    /// By robot: the topic of its maps, and the frame of the first.
+    map_frames: BTreeMap<String, (String, String)>,
     /// Topics of merged maps of other programs.
     merged_topics: BTreeSet<String>,
     robots: BTreeMap<String, RobotInfo>,
@@ -86,6 +88,7 @@ impl RobotSurvey {
             other_maps: BTreeSet::new(),
             unusable_maps: BTreeMap::new(),
             merged_maps: MergedMaps::default(),
+            map_frames: BTreeMap::new(),
             merged_topics: BTreeSet::new(),
             robots: BTreeMap::new(),
             unreadable: BTreeMap::new(),
@@ -129,12 +132,8 @@ impl RobotSurvey {
                     *self.unreadable.entry(topic.to_owned()).or_default() += 1;
                     return;
                 };
-                if self.merged_maps.includes(robot, &map.header.frame_id) {
-                    self.merged_topics.insert(topic.to_owned());
-                    if info.maps == 0 {
-                        self.robots.remove(robot);
-                    }
-                    return;
+                if !self.map_frames.contains_key(robot) {
+                    self.map_frames.insert(robot.to_owned(), (topic.to_owned(), map.header.frame_id.clone()));
                 }
                 info.maps += 1;
                 if let Err(error) = map.check() {
@@ -201,6 +200,9 @@ impl RobotSurvey {
             *self.unreadable.entry(topic.to_owned()).or_default() += 1;
             return;
         };
+        if is_static(topic) {
+            self.merged_maps.add_transforms(&message);
+        }
         self.inferred.odometry(prefix, is_static(topic), &message);
         let (poses, _) = match &mut self.tf {
             Some(tf) => tf.update(prefix, is_static(topic), &message),
@@ -215,6 +217,22 @@ impl RobotSurvey {
             }
             if !info.topics.contains(topic) {
                 info.topics.insert(topic.to_owned());
+            }
+        }
+    }
+
+    /// Removes the robots whose maps are merged ones of other programs. Call it once all messages were added.
+    pub(super) fn remove_merged_maps(&mut self) {
+        let frames = std::mem::take(&mut self.map_frames);
+        let mut origin = |robot: &str, frame: &str| self.merged_maps.origin(robot, frame, self.roles.mapped());
+        // What decides is what is known of all.
+        for (robot, (_, frame)) in &frames {
+            origin(robot, frame);
+        }
+        for (robot, (topic, frame)) in &frames {
+            if origin(robot, frame) == MapOrigin::Merged {
+                self.merged_topics.insert(topic.clone());
+                self.robots.remove(robot);
             }
         }
     }

@@ -83,6 +83,8 @@ pub(crate) struct RobotChannels {
     tags_in_tf: BTreeSet<String>,
     /// Whether any channel holds positions or bearings of tags in a sensor frame.
     has_cameras: bool,
+    /// Robots with maps.
+    mapped: BTreeSet<String>,
     /// Robots with scans and without maps.
     scanned: BTreeSet<String>,
     /// Robots with an odometry topic.
@@ -101,6 +103,7 @@ impl RobotChannels {
             known: BTreeSet::new(),
             tags_in_tf: BTreeSet::new(),
             has_cameras: false,
+            mapped: BTreeSet::new(),
             scanned: BTreeSet::new(),
             with_odometry: BTreeSet::new(),
         };
@@ -116,6 +119,9 @@ impl RobotChannels {
         roles.scanned = scanned.filter(|robot| !has_map(robot)).map(str::to_owned).collect();
         for channel in &channels {
             let Classified { role, robot, .. } = roles.classify(channel);
+            if role == Role::Map {
+                roles.mapped.insert(robot.to_owned());
+            }
             match role {
                 Role::MapUpdate => roles.updated.insert(robot.to_owned()),
                 Role::Map | Role::Tags | Role::TagMessage | Role::Scan => asking.insert(robot.to_owned()),
@@ -182,6 +188,11 @@ impl RobotChannels {
     pub(crate) fn scanning_robot<'a>(&self, channel: &'a Channel) -> Option<&'a str> {
         let holds_scans = channel.message_encoding == "cdr" && is_scan(&full_type_name(&channel.schema_name));
         match_robot(&self.topics.scan, &channel.topic).filter(|_| holds_scans)
+    }
+
+    /// Robots with maps, sorted by name.
+    pub(crate) fn mapped(&self) -> impl Iterator<Item = &str> + Clone {
+        self.mapped.iter().map(String::as_str)
     }
 
     /// Robots with scans and without maps, sorted by name.

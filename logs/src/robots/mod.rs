@@ -13,7 +13,7 @@ mod tag_reader;
 pub use cell_values::CellValues;
 pub(crate) use channels::{Classified, PoseSource, RobotChannels, Role};
 pub(crate) use inferred_poses::InferredPoses;
-pub(crate) use merged_maps::MergedMaps;
+pub(crate) use merged_maps::{MapOrigin, MergedMaps};
 pub(crate) use mounts::NoTransform;
 pub(crate) use pose::{NoPose, pose_with_covariance};
 pub(crate) use scans::{Scans, read_scan};

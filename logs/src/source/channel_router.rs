@@ -5,10 +5,11 @@ use super::channel::{Route, Stamp};
 use super::derived::Derived;
 use super::latched::Latch;
 use crate::names::rename_advice;
-use crate::robots::{CellValues, MergedMaps, RobotChannels, Role};
+use crate::robots::{CellValues, MapOrigin, MergedMaps, RobotChannels, Role};
 use crate::schemas::full_type_name;
+use crate::tf::{is_static, tf_topic};
 use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
-use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, decode};
+use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, TFMessage, decode};
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
 use std::collections::BTreeMap;
 
@@ -18,7 +19,11 @@ pub(super) struct ChannelRouter {
     roles: RobotChannels,
     /// How the values of maps' cells are read.
     map_values: CellValues,
-    merged_maps: MergedMaps,
+    /// `None` if every map is taken as the robot's of its topic.
+    merged_maps: Option<MergedMaps>,
+    /// The last map of each route whose origin is undecided: none live, where other maps may never be published.
+    undecided: Vec<(usize, Stamp, Vec<u8>)>,
+    holds_undecided: bool,
     routes: Vec<Route>,
     by_channel: BTreeMap<Channel, usize>,
     derived: Derived,
@@ -39,7 +44,9 @@ impl ChannelRouter {
             roles,
             robots,
             map_values,
-            merged_maps: MergedMaps::default(),
+            merged_maps: updates_maps.then(MergedMaps::default),
+            undecided: Vec::new(),
+            holds_undecided: true,
             routes: Vec::new(),
             by_channel: BTreeMap::new(),
         }
@@ -49,6 +56,7 @@ impl ChannelRouter {
     pub(super) fn live(robots: RobotTopics, map_values: CellValues) -> Self {
         let mut router = Self::new(robots, std::iter::empty(), true, map_values);
         router.derived.expect_sensors();
+        router.holds_undecided = false;
         router
     }
 
@@ -84,8 +92,8 @@ impl ChannelRouter {
         data: &[u8],
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
+        self.pass(index, stamp, data, output)?;
         let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
-        pass(route, self.map_values, &mut self.merged_maps, stamp, data, output)?;
         self.derived.send(route, &self.roles, data, output)
     }
 
@@ -123,9 +131,85 @@ impl ChannelRouter {
         data: &[u8],
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
+        self.pass(index, stamp, data, output)?;
         let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
-        pass(route, self.map_values, &mut self.merged_maps, stamp, data, output)?;
         self.derived.send_of_learnt(route, data, output)
+    }
+
+    /// Sends a message on the port of its role: unchanged, but for maps whose cells have values of another convention. A map
+    /// whose origin is undecided is held.
+    fn pass(
+        &mut self,
+        index: usize,
+        stamp: Stamp,
+        data: &[u8],
+        output: &Output<RobotMessages>,
+    ) -> Result<(), StageError> {
+        let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
+        if let Some(merged_maps) = &mut self.merged_maps
+            && tf_topic(&route.channel).is_some()
+            && is_static(&route.channel.topic)
+            && let Ok(transforms) = decode::<TFMessage>(data)
+        {
+            merged_maps.add_transforms(&transforms);
+        }
+        match route.role {
+            Role::Map => {
+                self.pass_map(index, stamp, data, self.holds_undecided, output)?;
+                self.pass_undecided(true, output)
+            }
+            Role::Tags => route.send(stamp, data, &output.tags, output.log_time()),
+            Role::Topology => route.send(stamp, data, &output.topology, output.log_time()),
+            Role::MapUpdate
+            | Role::Pose(_)
+            | Role::Odometry
+            | Role::TagMessage
+            | Role::Scan
+            | Role::Tf
+            | Role::Other => route.send(stamp, data, &output.other, output.log_time()),
+        }
+    }
+
+    fn pass_map(
+        &mut self,
+        index: usize,
+        stamp: Stamp,
+        data: &[u8],
+        may_hold: bool,
+        output: &Output<RobotMessages>,
+    ) -> Result<(), StageError> {
+        let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
+        let (topic, log_time) = (&route.channel.topic, output.log_time());
+        // One that cannot be read shows nothing of the others.
+        let header = decode::<Header>(data).ok();
+        let merged_maps = self.merged_maps.as_mut().zip(header);
+        let origin = merged_maps.map(|(maps, header)| maps.origin(&route.robot, &header.frame_id, self.roles.mapped()));
+        match origin {
+            Some(MapOrigin::Undecided) if may_hold => {
+                self.undecided.retain(|(held, ..)| *held != index);
+                self.undecided.push((index, stamp, data.to_vec()));
+                Ok(())
+            }
+            Some(MapOrigin::Merged) => {
+                output.warn(format!(
+                    "maps on `{topic}` are merged ones of another program, and are not taken as a robot's"
+                ));
+                route.send(stamp, data, &output.other, log_time)
+            }
+            _ => match self.map_values.translate(data) {
+                Some((translated, convention)) => {
+                    output.warn(format!("maps on `{topic}`: {convention}"));
+                    route.send(stamp, &translated, &output.map, log_time)
+                }
+                None => route.send(stamp, data, &output.map, log_time),
+            },
+        }
+    }
+
+    /// Sends the held maps whose origin is decided; all of them if they may be held no longer.
+    pub(super) fn pass_undecided(&mut self, may_hold: bool, output: &Output<RobotMessages>) -> Result<(), StageError> {
+        let undecided = std::mem::take(&mut self.undecided);
+        undecided.iter().try_for_each(|(index, stamp, data)| self.pass_map(*index, *stamp, data, may_hold, output))
     }
 
     /// Returns the index of a channel's route, and adds the route if there is none. `None` if the topic's name is too long and
@@ -226,40 +310,6 @@ impl ChannelRouter {
         }
         if output.pose.is_read() && !self.derived.has_odometry() {
             self.derived.warn_of_missing_poses(output);
-        }
-    }
-}
-
-/// Sends a message on the port of its role: unchanged, but for maps whose cells have values of another convention.
-fn pass(
-    route: &mut Route,
-    map_values: CellValues,
-    merged_maps: &mut MergedMaps,
-    stamp: Stamp,
-    data: &[u8],
-    output: &Output<RobotMessages>,
-) -> Result<(), StageError> {
-    let log_time = output.log_time();
-    let frame = || decode::<Header>(data).map_or_else(|_| String::new(), |header| header.frame_id);
-    match route.role {
-        Role::Map if merged_maps.includes(&route.robot, &frame()) => {
-            output.warn(format!(
-                "maps on `{}` are merged ones of another program, and are not taken as a robot's",
-                route.channel.topic
-            ));
-            route.send(stamp, data, &output.other, log_time)
-        }
-        Role::Map => match map_values.translate(data) {
-            Some((translated, convention)) => {
-                output.warn(format!("maps on `{}`: {convention}", route.channel.topic));
-                route.send(stamp, &translated, &output.map, log_time)
-            }
-            None => route.send(stamp, data, &output.map, log_time),
-        },
-        Role::Tags => route.send(stamp, data, &output.tags, log_time),
-        Role::Topology => route.send(stamp, data, &output.topology, log_time),
-        Role::MapUpdate | Role::Pose(_) | Role::Odometry | Role::TagMessage | Role::Scan | Role::Tf | Role::Other => {
-            route.send(stamp, data, &output.other, log_time)
         }
     }
 }

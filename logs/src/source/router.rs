@@ -154,6 +154,11 @@ impl Router {
         Ok(())
     }
 
+    /// Sends the maps whose origin the log has left undecided.
+    pub(crate) fn send_undecided_maps(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
+        self.channels.pass_undecided(false, output)
+    }
+
     /// Sends the maps that were updated since they were last sent.
     pub(crate) fn send_updated_maps(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
         self.channels.send_updated_maps(output)

@@ -78,6 +78,7 @@ impl McapSource {
 
     fn end(&mut self, output: &Output<RobotMessages>) -> Result<bool, StageError> {
         send_latched(&mut self.latched, self.window.start, &mut self.router, output)?;
+        self.router.send_undecided_maps(output)?;
         self.router.send_updated_maps(output)?;
         self.router.send_supplements(output)?;
         self.warn_of_damage(output);

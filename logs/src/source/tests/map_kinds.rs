@@ -1,6 +1,7 @@
 //! Maps that are not those of map servers: other cell values, merged maps of other programs.
 
 use super::*;
+use std::collections::BTreeSet;
 
 fn map<'a>(frame: &str, data: &'a [u8]) -> OccupancyGrid<'a> {
     let info = MapMetaData { width: data.len() as u32, height: 1, resolution: 0.05, ..Default::default() };
@@ -33,16 +34,40 @@ fn cells_of_0_and_1_are_free_and_occupied_unless_the_pipeline_keeps_them() {
 }
 
 #[test]
-fn a_merged_map_of_another_program_is_no_robot() {
+fn a_merged_map_of_another_program_is_no_robot_wherever_it_comes() {
     let grid = [0, 0, 100, 0];
+    let all = [("/map_merge/map", "world"), ("/a/map", "map"), ("/b/map", "b/map")];
+    for first in 0..3 {
+        let log = |log: &mut TestLog| {
+            for (second, index) in (1..).zip([first, first + 1, first + 2]) {
+                let (topic, frame) = all[index % 3];
+                log.add(topic, OccupancyGrid::NAME, second, &map(frame, &grid));
+            }
+        };
+        let read = read(&log, "");
+        let robots: BTreeSet<String> = read.on("map").iter().map(|message| message.robot().to_owned()).collect();
+        assert_eq!(robots, BTreeSet::from(["a".to_owned(), "b".to_owned()]), "{first}");
+        assert_eq!(read.on("other").len(), 1, "it stays in the log");
+        assert!(read.warnings.keys().any(|warning| warning.starts_with("maps on `/map_merge/map` are merged ones")));
+        let as_logged = self::read(&log, "names = \"as_logged\"");
+        assert_eq!((as_logged.on("map").len(), as_logged.warnings.len()), (3, 0), "{:?}", as_logged.warnings);
+    }
+}
+
+#[test]
+fn maps_that_are_all_in_the_world_are_those_of_robots() {
     let log = |log: &mut TestLog| {
-        log.add("/a/map", OccupancyGrid::NAME, 1, &map("map", &grid));
-        log.add("/b/map", OccupancyGrid::NAME, 2, &map("b/map", &grid));
-        log.add("/map_merge/map", OccupancyGrid::NAME, 3, &map("world", &grid));
+        for (second, robot) in (1..).zip(["a", "b", "c", "a"]) {
+            log.add(&format!("/{robot}/map"), OccupancyGrid::NAME, second, &map("world", &[0, 100, 0]));
+        }
     };
-    let read = read(&log, "");
-    let robots: Vec<String> = read.on("map").iter().map(|message| message.robot().to_owned()).collect();
-    assert_eq!(robots, ["a", "b"]);
-    assert_eq!(read.on("other").len(), 1, "it stays in the log");
-    assert!(read.warnings.keys().any(|warning| warning.starts_with("maps on `/map_merge/map` are merged ones")));
+    let robots: Vec<String> = read(&log, "").on("map").iter().map(|message| message.robot().to_owned()).collect();
+    assert_eq!(robots, ["b", "a", "c", "a"], "the first is held until it is certain");
+    let alone = |log: &mut TestLog| {
+        log.add("/a/map", OccupancyGrid::NAME, 1, &map("world", &[0, 100, 0]));
+        for robot in ["b", "c"] {
+            log.raw(&format!("/{robot}/map"), OccupancyGrid::NAME, 2, b"cut");
+        }
+    };
+    assert_eq!(read(&alone, "").on("map").len(), 3, "what stays undecided is sent at the end");
 }
