@@ -3,6 +3,7 @@
 pub mod map_cleaner;
 pub mod map_selector;
 pub mod scan_mapper;
+pub mod slam;
 
 use gridweave_runtime::stage::StageKind;
 

@@ -7,6 +7,7 @@ pub mod placement;
 pub mod robot_maps;
 pub mod robot_pair;
 pub mod scan_grid;
+pub(crate) mod sparse;
 #[cfg(test)]
 pub(crate) mod test_world;
 pub mod walls;

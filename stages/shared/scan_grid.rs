@@ -150,17 +150,6 @@ impl ScanGrid {
         SnapshotMap { geometry, cells }
     }
 
-    /// The map so far within `reach` metres of a point along x and y; `None` if none of it is on the grid.
-    pub fn around(&self, place: &Point2, reach: f64) -> Option<SnapshotMap> {
-        let GridGeometry { width, height, .. } = self.geometry;
-        let middle = self.to_cells(place);
-        let cells = reach / self.geometry.resolution;
-        let bound = |at: f64, count: usize| (at.max(0.0) as usize).min(count - 1);
-        let low = Cell { column: bound(middle.x - cells, width), row: bound(middle.y - cells, height) };
-        let high = Cell { column: bound(middle.x + cells, width), row: bound(middle.y + cells, height) };
-        self.index(&middle).map(|_| self.part(low, high))
-    }
-
     /// The map so far, including unknown margins.
     pub fn whole(&self) -> SnapshotMap {
         SnapshotMap { geometry: self.geometry, cells: self.log_odds.iter().map(|&value| percent(value)).collect() }
@@ -268,15 +257,5 @@ mod tests {
         let map = grid.snapshot().unwrap();
         assert_eq!(map.cells.len(), 40);
         assert!(map.cells.iter().all(|value| (0..50).contains(value)));
-    }
-
-    #[test]
-    fn the_part_around_a_point_is_cut_to_the_grid() {
-        let grid = drawn(Point2::new(-2.0, -2.0), Point2::new(2.0, 2.0));
-        let part = grid.around(&Point2::new(1.5, 0.0), 1.0).unwrap();
-        assert_eq!((part.geometry.width, part.geometry.height), (30, 41));
-        assert!((part.geometry.origin.translation.x - 0.5).abs() < 1e-9);
-        assert!(grid.around(&Point2::new(9.0, 0.0), 1.0).is_none());
-        assert!(grid.around(&Point2::new(f64::NAN, 0.0), 1.0).is_none());
     }
 }

@@ -322,15 +322,13 @@ impl RobotSurvey {
         let by_topic = self.odometry.get(name).map(|topic| format!("`{topic}`"));
         let how = match (poses, by_topic.or_else(|| self.inferred.odometry_origin(name))) {
             (Some(poses), _) => {
-                format!("builds one from its {} scans, at the poses of {poses}; a SLAM is better", robot.scans)
+                format!("builds one from its {} scans, at the poses of {poses}", robot.scans)
             }
-            (None, Some(odometry)) => format!(
-                "builds one from its {} scans, each matched with those before it along {odometry}: it drifts, and a full SLAM \
-                 is better",
-                robot.scans
-            ),
+            (None, Some(odometry)) => {
+                format!("builds one from its {} scans by SLAM, with the odometry of {odometry}", robot.scans)
+            }
             (None, None) => {
-                format!("cannot build one from its {} scans without poses or odometry", robot.scans)
+                format!("builds one from its {} scans by SLAM; odometry would make it surer", robot.scans)
             }
         };
         format!("there is no map of {name}: `merge` {how}")

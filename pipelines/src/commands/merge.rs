@@ -36,9 +36,7 @@ pub(crate) fn merge(args: &MergeArgs, registry: &Registry) -> Result<Status> {
             [] => "auto_merge",
             robots => {
                 let robots = robots.join(", ");
-                eprint_line(format_args!(
-                    "the log has no map of {robots}: maps are built from scans (scan_merge); maps of a SLAM are more accurate"
-                ));
+                eprint_line(format_args!("the log has no map of {robots}: maps are built from scans (scan_merge)"));
                 "scan_merge"
             }
         },

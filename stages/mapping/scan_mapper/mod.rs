@@ -8,26 +8,26 @@
 //! - **with poses in the map** (of a localizer or a SLAM), every beam from the pose of the lidar at its time,
 //!   interpolated between the poses before and after it: a robot that turns at 1 radian per second turns by 6 degrees
 //!   during a scan of 0.1 seconds;
-//! - **with odometry only**, scans are first registered on the map so far, one for each step of the drive, by
-//!   [ICP](crate::registration::icp_refiner) from several rotations about the pose by odometry. There is no loop
-//!   closure: the map drifts, and is deformed as a whole. A SLAM does better, and where there is one its map is the one
-//!   to log.
+//! - **with odometry only**, at the poses of a [SLAM](crate::mapping::slam): scans are registered on those around them,
+//!   loops are closed, and the map is drawn anew after each closure, so that each wall is there once;
+//! - **with scans only**, likewise, with odometry from the scans themselves.
+//!
+//! A robot whose scans hardly ever lie on each other has lost its way: no map of it is sent.
 //!
 //! - [`ScanBeams`]: the beams of a scan from the base of the robot, within the lidar's limits.
 //! - [`ScanMap`]: the growing map.
-//! - [`match_scan`]: registration of a scan on the map so far.
 
 mod beams;
-mod matching;
+mod drive;
 mod parameters;
 mod robot;
 mod scan_map;
+mod scan_odometry;
 mod stage;
 #[cfg(test)]
 mod tests;
 
 pub use beams::{BaseBeam, ScanBeams};
-pub use matching::{Motion, match_scan};
-pub use parameters::ScanMapperParameters;
+pub use parameters::{MappingMode, ScanMapperParameters};
 pub use scan_map::{ScanMap, TooLarge};
 pub use stage::kind;

@@ -6,6 +6,18 @@ use gridweave_runtime::stage::Parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// When the results of robots with odometry only are sent.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MappingMode {
+    /// As the robot drives: each pose as it is known then, and the map at every interval. Loop closures move later
+    /// maps, and not the poses that were sent.
+    #[default]
+    Online,
+    /// At the end: all poses and the map, with all loop closures.
+    Offline,
+}
+
 /// Parameters of the scan mapper.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -33,22 +45,26 @@ pub struct ScanMapperParameters {
     /// lidars report the same for glass and for black paint.
     #[schemars(range(min = 0.0), extend("exclusiveMaximum" = 1000))]
     pub free_without_echo: f64,
+    /// When poses and maps along odometry are sent: `online` as the robot drives, `offline` at the end of a log, with
+    /// all loop closures. Maps at the poses of a localizer are always sent as the robot drives.
+    pub mode: MappingMode,
     /// Time between maps, seconds, if anything was added; one is sent at the end, too.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub interval: f64,
     /// Largest age of the pose before a beam, seconds, if there is one after it.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_pose_age: f64,
-    /// Time without a pose after the first scan, seconds, after which scans are matched along odometry.
+    /// Time without a pose after the first scan, seconds, after which scans are registered along odometry.
     #[schemars(range(min = 0.0, max = 8.0))]
     pub wait_for_poses: f64,
-    /// Along odometry a scan is matched and added whenever the robot has moved by this distance, metres.
+    /// Along odometry a scan is registered and added whenever the robot has moved by this distance, metres.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 10))]
     pub step: f64,
     /// Or has turned by this angle, radians.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 3.2))]
     pub step_yaw: f64,
-    /// Standard deviation of odometry, as a share of the distance and of the turn since the last matched scan.
+    /// Standard deviation of odometry that is assumed before the first scans, as a share of the distance and of the
+    /// turn; after these it is estimated from the scans.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub odometry_deviation: f64,
 }
@@ -63,6 +79,7 @@ impl Default for ScanMapperParameters {
             min_probability: 0.02,
             max_range: 30.0,
             free_without_echo: 0.0,
+            mode: MappingMode::Online,
             interval: 10.0,
             max_pose_age: 0.5,
             wait_for_poses: 5.0,

@@ -1,7 +1,10 @@
 //! One robot with its scans and poses.
 
-use super::{Motion, ScanBeams, ScanMap, ScanMapperParameters, TooLarge, match_scan};
+use super::drive::{Drive, LostDrive};
+use super::scan_odometry::ScanOdometry;
+use super::{ScanBeams, ScanMap, ScanMapperParameters, TooLarge};
 use crate::shared::geometry::{Point2, Pose2, pose};
+use crate::shared::scan_grid::SnapshotMap;
 use crate::tags::tag_localizer::{PoseTrack, Position};
 use gridweave_runtime::message::LogTime;
 use std::collections::VecDeque;
@@ -10,14 +13,15 @@ use std::collections::VecDeque;
 const PATIENCE: f64 = 10.0;
 
 /// Source of the robot's poses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Known {
+enum Localization {
     /// No messages so far, or odometry only, and not for long.
     NotYet,
     /// By poses in its map.
-    ByPoses,
-    /// By odometry, with which scans are matched.
-    ByOdometry,
+    ByPoses(ScanMap),
+    /// By odometry and the registration of scans.
+    ByOdometry(Drive),
+    /// By the registration of scans alone.
+    ByScans(Drive, ScanOdometry),
 }
 
 /// Outcome of a scan.
@@ -27,7 +31,7 @@ pub(super) enum ScanOutcome {
     Used,
     /// No pose of the robot is known.
     NoPose,
-    /// The walls do not constrain its pose: it was added at the pose by odometry.
+    /// It lies on no earlier one: it was added at the pose by odometry.
     NotMatched,
     /// The map would get too large.
     TooLarge,
@@ -35,40 +39,32 @@ pub(super) enum ScanOutcome {
 
 /// A robot whose map is built.
 pub(super) struct Robot {
-    known: Known,
+    localization: Localization,
     poses: PoseTrack,
     odometry: PoseTrack,
+    /// All of odometry, where poses are sent at the end.
+    kept_odometry: Vec<(LogTime, Pose2)>,
     /// The frame of the poses.
     pub(super) frame: Option<String>,
     waiting: VecDeque<(LogTime, ScanBeams)>,
     first_scan: Option<LogTime>,
-    pub(super) map: ScanMap,
-    /// Pose in the map at which the odometry of a robot without poses began.
-    transform_map_odometry: Pose2,
-    /// Pose by odometry at the last matched scan.
-    last_step: Option<Pose2>,
-    /// Time of the last scan in the map.
-    pub(super) drawn_until: Option<LogTime>,
-    /// Time of the first scan in the map.
-    pub(super) first_drawn: Option<LogTime>,
+    /// Times of the first and the last scan in the map.
+    pub(super) drawn: Option<[LogTime; 2]>,
     /// Time of the last scan in the map that was sent.
     pub(super) sent_until: Option<LogTime>,
 }
 
 impl Robot {
-    pub(super) fn new(parameters: &ScanMapperParameters) -> Self {
+    pub(super) fn new() -> Self {
         Self {
-            known: Known::NotYet,
+            localization: Localization::NotYet,
             poses: PoseTrack::default(),
             odometry: PoseTrack::default(),
+            kept_odometry: Vec::new(),
             frame: None,
             waiting: VecDeque::new(),
             first_scan: None,
-            map: ScanMap::new(parameters),
-            transform_map_odometry: Pose2::identity(),
-            last_step: None,
-            drawn_until: None,
-            first_drawn: None,
+            drawn: None,
             sent_until: None,
         }
     }
@@ -81,37 +77,66 @@ impl Robot {
 
     /// Adds a pose in the map. Returns `false` if it is not used, as the map is built by odometry already, or as it
     /// is late.
-    pub(super) fn add_pose(&mut self, time: LogTime, pose: &Pose2) -> bool {
-        if self.known == Known::ByOdometry {
-            return false;
+    pub(super) fn add_pose(&mut self, time: LogTime, pose: &Pose2, parameters: &ScanMapperParameters) -> bool {
+        match self.localization {
+            Localization::ByOdometry(_) | Localization::ByScans(..) => return false,
+            Localization::NotYet => {
+                self.localization = Localization::ByPoses(ScanMap::new(parameters));
+                self.kept_odometry = Vec::new();
+            }
+            Localization::ByPoses(_) => {}
         }
-        self.known = Known::ByPoses;
         self.poses.add(time, position(pose))
     }
 
-    /// Adds a pose by odometry. Returns `false` if it is late.
-    pub(super) fn add_odometry(&mut self, time: LogTime, pose: &Pose2) -> bool {
-        self.odometry.add(time, position(pose))
+    /// Adds a pose by odometry, and keeps it if `is_kept`. Returns `false` if it is late, or comes after the start of the
+    /// map without it.
+    pub(super) fn add_odometry(&mut self, time: LogTime, pose: &Pose2, is_kept: bool) -> bool {
+        if matches!(self.localization, Localization::ByScans(..)) {
+            return false;
+        }
+        let is_used = self.odometry.add(time, position(pose));
+        if is_used && is_kept && !matches!(self.localization, Localization::ByPoses(_)) {
+            self.kept_odometry.push((time, *pose));
+        }
+        is_used
     }
 
-    /// Whether the stage sends poses of the robot, as it has no others.
-    pub(super) fn is_by_odometry(&self) -> bool {
-        self.known == Known::ByOdometry
+    /// Takes the odometry that was kept.
+    pub(super) fn take_odometry(&mut self) -> Vec<(LogTime, Pose2)> {
+        std::mem::take(&mut self.kept_odometry)
     }
 
-    /// Pose in the map for a pose by odometry.
-    pub(super) fn in_map(&self, odometry: &Pose2) -> Pose2 {
-        self.transform_map_odometry * odometry
+    /// The drive whose poses are found by the registration of scans; `None` if the robot has other poses, or none yet.
+    fn drive(&self) -> Option<&Drive> {
+        match &self.localization {
+            Localization::ByOdometry(drive) | Localization::ByScans(drive, _) => Some(drive),
+            Localization::NotYet | Localization::ByPoses(_) => None,
+        }
     }
 
-    /// Starts to match scans along odometry, if no poses came for long enough or none will come.
+    /// Whether its poses are found by the registration of scans.
+    pub(super) fn is_by_scans(&self) -> bool {
+        self.drive().is_some()
+    }
+
+    /// Pose in the map for a pose by odometry; `None` if the robot has other poses, or none yet.
+    pub(super) fn in_map(&self, time: LogTime, odometry: &Pose2) -> Option<Pose2> {
+        self.drive().map(|drive| drive.in_map(time, odometry))
+    }
+
+    /// Starts to register scans, along odometry if there is any, once no poses came for long enough or none will come.
     pub(super) fn decide(&mut self, parameters: &ScanMapperParameters, is_end: bool) {
-        let (Known::NotYet, Some(first), Some(latest)) = (self.known, self.first_scan, self.odometry.latest_time())
-        else {
-            return;
-        };
-        if is_end || latest.seconds_since(first) >= parameters.wait_for_poses {
-            self.known = Known::ByOdometry;
+        let (Localization::NotYet, Some(first)) = (&self.localization, self.first_scan) else { return };
+        let has_waited = |latest: LogTime| is_end || latest.seconds_since(first) >= parameters.wait_for_poses;
+        match (self.odometry.latest_time(), self.waiting.back()) {
+            (Some(latest), _) if has_waited(latest) => {
+                self.localization = Localization::ByOdometry(Drive::new(parameters));
+            }
+            (None, Some((newest, _))) if has_waited(*newest) => {
+                self.localization = Localization::ByScans(Drive::new(parameters), ScanOdometry::default());
+            }
+            _ => {}
         }
     }
 
@@ -123,97 +148,133 @@ impl Robot {
         is_end: bool,
         mut outcome: impl FnMut(ScanOutcome),
     ) {
-        loop {
-            let latest = match self.known {
-                Known::NotYet => None,
-                Known::ByPoses => self.poses.latest_time(),
-                Known::ByOdometry => self.odometry.latest_time(),
-            };
-            let Some((time, scan)) = self.waiting.front() else { return };
+        if let Localization::ByScans(drive, odometry) = &mut self.localization {
+            for (time, scan) in self.waiting.drain(..) {
+                let at = odometry.pose(time, &scan, drive);
+                self.kept_odometry.push((time, at));
+                let is_due = drive.is_due(&at, parameters);
+                let is_matched = !is_due || drive.add(time, &at, &scan);
+                outcome(if is_matched { ScanOutcome::Used } else { ScanOutcome::NotMatched });
+            }
+        } else {
+            self.draw_at_poses(parameters, is_end, outcome);
+        }
+        let (Localization::ByOdometry(drive) | Localization::ByScans(drive, _)) = &mut self.localization else {
+            return;
+        };
+        if is_end {
+            drive.finish();
+        }
+        self.drawn = drive.times();
+    }
+
+    /// Adds the scans for whose beams poses are known, by a localizer or by odometry.
+    fn draw_at_poses(&mut self, parameters: &ScanMapperParameters, is_end: bool, mut outcome: impl FnMut(ScanOutcome)) {
+        let latest = match self.localization {
+            Localization::NotYet | Localization::ByScans(..) => None,
+            Localization::ByPoses(_) => self.poses.latest_time(),
+            Localization::ByOdometry(_) => self.odometry.latest_time(),
+        };
+        while let Some((time, scan)) = self.waiting.front() {
             let is_due = latest.is_some_and(|latest| latest >= time.plus_seconds(scan.duration));
             let newest = self.waiting.back().map_or(*time, |(newest, _)| *newest);
             if !is_due && !is_end && newest.seconds_since(*time) < PATIENCE {
-                return;
+                break;
             }
-            let Some((time, scan)) = self.waiting.pop_front() else { return };
-            outcome(match self.known {
+            let Some((time, scan)) = self.waiting.pop_front() else { break };
+            outcome(match &mut self.localization {
                 // The last scan of a log has no pose after its end.
                 _ if !is_due && latest.is_some_and(|latest| latest >= time) => ScanOutcome::Used,
                 _ if !is_due => ScanOutcome::NoPose,
-                Known::NotYet => ScanOutcome::NoPose,
-                Known::ByPoses => self.draw_by_poses(time, &scan, parameters),
-                Known::ByOdometry => self.draw_by_odometry(time, &scan, parameters),
+                Localization::NotYet | Localization::ByScans(..) => ScanOutcome::NoPose,
+                Localization::ByPoses(map) => {
+                    let drawn = draw_by_poses(map, &self.poses, time, &scan, parameters);
+                    if drawn == ScanOutcome::Used {
+                        self.drawn = Some([self.drawn.map_or(time, |[first, _]| first), time]);
+                    }
+                    drawn
+                }
+                Localization::ByOdometry(drive) => add_to_drive(drive, &self.odometry, time, &scan, parameters),
             });
         }
     }
 
-    fn draw_by_poses(&mut self, time: LogTime, scan: &ScanBeams, parameters: &ScanMapperParameters) -> ScanOutcome {
-        let at = |delay: f64| pose_at(&self.poses, time.plus_seconds(delay), parameters);
-        // If the poses at the beginning and the end of a scan are known, those between are.
-        if at(0.0).is_none() || at(scan.duration).is_none() {
-            return ScanOutcome::NoPose;
-        }
-        match self.map.draw(scan, at) {
-            Ok(()) => {
-                self.drawn_until = Some(time);
-                ScanOutcome::Used
+    /// The map so far; `None` if nothing is known.
+    ///
+    /// # Errors
+    /// A scan is so far away that the map would get too large: it is left out.
+    pub(super) fn map(&mut self) -> Result<Option<SnapshotMap>, TooLarge> {
+        match &mut self.localization {
+            Localization::NotYet => Ok(None),
+            Localization::ByPoses(map) => Ok(map.snapshot()),
+            Localization::ByOdometry(drive) | Localization::ByScans(drive, _) => {
+                drive.draw().map(|()| drive.map().snapshot())
             }
-            Err(TooLarge) => ScanOutcome::TooLarge,
         }
     }
 
-    fn draw_by_odometry(&mut self, time: LogTime, scan: &ScanBeams, parameters: &ScanMapperParameters) -> ScanOutcome {
-        let Some(start) = pose_at(&self.odometry, time, parameters) else { return ScanOutcome::NoPose };
-        let mut outcome = ScanOutcome::Used;
-        if let Some(last) = self.last_step {
-            let moved = last.inverse() * start;
-            let motion = Motion { way: moved.translation.vector.norm(), turn: moved.rotation.angle().abs() };
-            if motion.way < parameters.step && motion.turn < parameters.step_yaw {
-                return ScanOutcome::Used;
-            }
-            let guess = self.transform_map_odometry * start;
-            // The relative poses of the beams of one scan are those of odometry.
-            let still = self.without_motion(time, scan, &start, parameters);
-            match match_scan(&self.map, &still, &guess, motion, parameters) {
-                Some(found) => self.transform_map_odometry = found * start.inverse(),
-                None => outcome = ScanOutcome::NotMatched,
-            }
-        }
-        self.last_step = Some(start);
-        let (track, transform) = (&self.odometry, self.transform_map_odometry);
-        let at = |delay: f64| Some(transform * pose_at(track, time.plus_seconds(delay), parameters)?);
-        match self.map.draw(scan, at) {
-            Ok(()) => {
-                self.drawn_until = Some(time);
-                outcome
-            }
-            Err(TooLarge) => ScanOutcome::TooLarge,
-        }
+    /// Whether its scans lie so seldom on each other that there is no map of them.
+    pub(super) fn lost(&self) -> Option<LostDrive> {
+        self.drive().and_then(Drive::lost)
     }
+}
 
-    /// The scan of a robot that stands still at `start`.
-    fn without_motion(
-        &self,
-        time: LogTime,
-        scan: &ScanBeams,
-        start: &Pose2,
-        parameters: &ScanMapperParameters,
-    ) -> ScanBeams {
-        let mut still = scan.clone();
-        if scan.duration == 0.0 {
-            return still;
-        }
-        let transform_lidar_base = scan.transform_base_lidar.inverse();
-        for beam in &mut still.beams {
-            let Some(base) = pose_at(&self.odometry, time.plus_seconds(beam.delay), parameters) else { continue };
-            let (sine, cosine) = beam.angle.sin_cos();
-            let end = Point2::new(cosine * beam.range, sine * beam.range);
-            let end = transform_lidar_base * (start.inverse() * (base * (scan.transform_base_lidar * end)));
-            (beam.angle, beam.range, beam.delay) = (end.y.atan2(end.x), end.coords.norm(), 0.0);
-        }
-        still.duration = 0.0;
-        still
+fn draw_by_poses(
+    map: &mut ScanMap,
+    poses: &PoseTrack,
+    time: LogTime,
+    scan: &ScanBeams,
+    parameters: &ScanMapperParameters,
+) -> ScanOutcome {
+    let at = |delay: f64| pose_at(poses, time.plus_seconds(delay), parameters);
+    // If the poses at the beginning and the end of a scan are known, those between are.
+    if at(0.0).is_none() || at(scan.duration).is_none() {
+        return ScanOutcome::NoPose;
     }
+    match map.draw(scan, at) {
+        Ok(()) => ScanOutcome::Used,
+        Err(TooLarge) => ScanOutcome::TooLarge,
+    }
+}
+
+fn add_to_drive(
+    drive: &mut Drive,
+    odometry: &PoseTrack,
+    time: LogTime,
+    scan: &ScanBeams,
+    parameters: &ScanMapperParameters,
+) -> ScanOutcome {
+    let Some(start) = pose_at(odometry, time, parameters) else { return ScanOutcome::NoPose };
+    if !drive.is_due(&start, parameters) {
+        return ScanOutcome::Used;
+    }
+    // The relative poses of the beams of one scan are those of odometry.
+    let still = without_motion(odometry, time, scan, &start, parameters);
+    if drive.add(time, &start, &still) { ScanOutcome::Used } else { ScanOutcome::NotMatched }
+}
+
+/// The scan of a robot that stands still at `start`.
+fn without_motion(
+    odometry: &PoseTrack,
+    time: LogTime,
+    scan: &ScanBeams,
+    start: &Pose2,
+    parameters: &ScanMapperParameters,
+) -> ScanBeams {
+    let mut still = scan.clone();
+    if scan.duration == 0.0 {
+        return still;
+    }
+    let transform_lidar_base = scan.transform_base_lidar.inverse();
+    for beam in &mut still.beams {
+        let Some(base) = pose_at(odometry, time.plus_seconds(beam.delay), parameters) else { continue };
+        let (sine, cosine) = beam.angle.sin_cos();
+        let end = Point2::new(cosine * beam.range, sine * beam.range);
+        let end = transform_lidar_base * (start.inverse() * (base * (scan.transform_base_lidar * end)));
+        (beam.angle, beam.range, beam.delay) = (end.y.atan2(end.x), end.coords.norm(), 0.0);
+    }
+    still.duration = 0.0;
+    still
 }
 
 fn position(pose: &Pose2) -> Position {

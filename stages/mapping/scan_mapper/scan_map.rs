@@ -29,6 +29,11 @@ impl ScanMap {
         Self { resolution: parameters.resolution, evidence: parameters.evidence(), grid: None }
     }
 
+    /// Makes it empty.
+    pub fn clear(&mut self) {
+        self.grid = None;
+    }
+
     /// Adds a scan of a robot whose base was at `transform_map_base(delay)` at that many seconds after the first
     /// beam. Beams at times without a pose are left out.
     ///
@@ -101,11 +106,6 @@ impl ScanMap {
     /// The map so far, cropped to its known part; `None` if nothing is known.
     pub fn snapshot(&self) -> Option<SnapshotMap> {
         self.grid.as_ref()?.snapshot()
-    }
-
-    /// The map so far within `reach` metres of a point; `None` if nothing was added there.
-    pub fn around(&self, place: &Point2, reach: f64) -> Option<SnapshotMap> {
-        self.grid.as_ref()?.around(place, reach)
     }
 }
 

@@ -1,7 +1,7 @@
 //! The stage `scan_mapper`.
 
 use super::robot::{Robot, ScanOutcome};
-use super::{ScanBeams, ScanMapperParameters};
+use super::{MappingMode, ScanBeams, ScanMapperParameters, TooLarge};
 use crate::shared::geometry::Pose2;
 use crate::tags::tag_localizer::time_of;
 use gridweave_runtime::message::LogTime;
@@ -14,8 +14,7 @@ pub fn kind() -> StageKind {
     StageKind::stage(
         "scan_mapper",
         "Builds the maps of robots from the scans of their lidars, for robots without maps: at the poses of a localizer, or, with \
-         odometry only, each scan registered on the earlier ones. There is no loop closure: where a SLAM can be run, its map is \
-         better.",
+         odometry only, of a SLAM with loop closures.",
         |parameters: ScanMapperParameters, _| {
             Ok(ScanMapper { parameters, robots: BTreeMap::new(), with_map: BTreeSet::new() })
         },
@@ -64,6 +63,7 @@ impl ScanMapper {
         output: &Output<Drawn>,
     ) -> Result<(), StageError> {
         let time = time_of(message.header.stamp, message.log_time());
+        let parameters = self.parameters.clone();
         let Some(robot) = self.robot(message.robot(), output) else { return Ok(()) };
         let frame = robot.frame.get_or_insert_with(|| message.header.frame_id.clone());
         if *frame != message.header.frame_id {
@@ -75,7 +75,7 @@ impl ScanMapper {
             return Ok(());
         }
         let pose = message.pose.pose.planar();
-        if !is_finite(&pose) || !robot.add_pose(time, &pose) {
+        if !is_finite(&pose) || !robot.add_pose(time, &pose, &parameters) {
             output.warn(format!(
                 "poses of {} that are not finite, late, or after the start of its map by odometry are left out",
                 message.robot()
@@ -92,20 +92,17 @@ impl ScanMapper {
     ) -> Result<(), StageError> {
         let time = time_of(message.header.stamp, message.log_time());
         let parameters = self.parameters.clone();
+        let is_offline = parameters.mode == MappingMode::Offline;
         let Some(robot) = self.robot(message.robot(), output) else { return Ok(()) };
         let pose = message.pose.pose.planar();
-        if !is_finite(&pose) || !robot.add_odometry(time, &pose) {
+        if !is_finite(&pose) || !robot.add_odometry(time, &pose, is_offline) {
             output.warn(format!("odometry of {} that is not finite or late is left out", message.robot()));
             return Ok(());
         }
         robot.decide(&parameters, false);
         self.draw_and_send(message.robot(), false, output)?;
-        match self.robots.get(message.robot()).filter(|robot| robot.is_by_odometry()) {
-            Some(robot) => {
-                let header = Header { stamp: message.header.stamp, frame_id: map_frame(message.robot(), robot) };
-                let pose = PoseStamped { header, pose: robot.in_map(&pose).into() };
-                output.pose.send(message.robot(), &pose.into())
-            }
+        match self.robots.get(message.robot()).filter(|_| !is_offline) {
+            Some(robot) => send_pose(message.robot(), robot, time, &pose, output),
             None => Ok(()),
         }
     }
@@ -113,12 +110,14 @@ impl ScanMapper {
     fn receive_scan(&mut self, message: Received<'_, RangeScan>, output: &Output<Drawn>) -> Result<(), StageError> {
         let time = time_of(message.header.stamp, message.log_time());
         let scan = ScanBeams::of(&message, &self.parameters);
+        let parameters = self.parameters.clone();
         let Some(robot) = self.robot(message.robot(), output) else { return Ok(()) };
         let Some(scan) = scan else {
             output.warn(format!("scans of {} with angles or times that are not finite are left out", message.robot()));
             return Ok(());
         };
         robot.add_scan(time, scan);
+        robot.decide(&parameters, false);
         self.draw_and_send(message.robot(), false, output)
     }
 
@@ -151,7 +150,7 @@ impl ScanMapper {
         if self.with_map.contains(name) {
             return None;
         }
-        Some(self.robots.entry(name.to_owned()).or_insert_with(|| Robot::new(&self.parameters)))
+        Some(self.robots.entry(name.to_owned()).or_insert_with(Robot::new))
     }
 
     /// Adds the scans with known poses, and sends the map if it is time.
@@ -163,18 +162,39 @@ impl ScanMapper {
                 output.warn(format!("scans of {name} were left out: there is no pose of it for their time"))
             }
             ScanOutcome::NotMatched => {
-                output.warn(format!("scans of {name} do not fit its map, and were added at their poses by odometry"));
+                output.warn(format!(
+                    "scans of {name} lie on none of its earlier ones: their poses are those of odometry"
+                ));
             }
-            ScanOutcome::TooLarge => output.warn(format!("scans of {name} were left out: its map would get too large")),
+            ScanOutcome::TooLarge => output.warn(too_large(name)),
         });
-        let Some(drawn_until) = robot.drawn_until else { return Ok(()) };
-        let since = robot.sent_until.unwrap_or(*robot.first_drawn.get_or_insert(drawn_until));
-        let is_due = is_end || drawn_until.seconds_since(since) >= self.parameters.interval;
-        if is_due && robot.sent_until != Some(drawn_until) {
-            robot.sent_until = Some(drawn_until);
-            send_map(name, robot, drawn_until, output)?;
+        let Some([first, last]) = robot.drawn else { return Ok(()) };
+        let is_offline = self.parameters.mode == MappingMode::Offline && robot.is_by_scans();
+        if !is_offline {
+            for (time, odometry) in robot.take_odometry() {
+                send_pose(name, robot, time, &odometry, output)?;
+            }
         }
-        Ok(())
+        let is_due =
+            is_end || !is_offline && last.seconds_since(robot.sent_until.unwrap_or(first)) >= self.parameters.interval;
+        if !is_due || robot.sent_until == Some(last) {
+            return Ok(());
+        }
+        robot.sent_until = Some(last);
+        if let Some(lost) = robot.lost() {
+            output.warn(format!(
+                "no map of {name}: {} of {} scans lie on none of its others, the first of them {:.1} s after its first scan. Its \
+                 odometry or its scans may be wrong",
+                lost.unmatched,
+                lost.scans,
+                lost.since.seconds_since(first)
+            ));
+            return Ok(());
+        }
+        for (time, odometry) in robot.take_odometry() {
+            send_pose(name, robot, time, &odometry, output)?;
+        }
+        send_map(name, robot, last, output)
     }
 
     fn finish(&mut self, output: &Output<Drawn>) -> Result<(), StageError> {
@@ -184,8 +204,9 @@ impl ScanMapper {
                 robot.decide(&self.parameters, true);
             }
             self.draw_and_send(&name, true, output)?;
-            if self.robots.get(&name).is_some_and(|robot| robot.drawn_until.is_some() && robot.map.snapshot().is_none())
-            {
+            let is_empty =
+                |robot: &mut Robot| robot.drawn.is_some() && robot.lost().is_none() && robot.map() == Ok(None);
+            if self.robots.get_mut(&name).is_some_and(is_empty) {
                 output.warn(format!(
                     "no map of {name} was drawn: its scans show nothing within {} m",
                     self.parameters.max_range
@@ -196,10 +217,31 @@ impl ScanMapper {
     }
 }
 
-fn send_map(name: &str, robot: &Robot, drawn_until: LogTime, output: &Output<Drawn>) -> Result<(), StageError> {
-    let Some(map) = robot.map.snapshot() else { return Ok(()) };
+fn send_map(name: &str, robot: &mut Robot, drawn_until: LogTime, output: &Output<Drawn>) -> Result<(), StageError> {
+    let map = robot.map().unwrap_or_else(|TooLarge| {
+        output.warn(too_large(name));
+        None
+    });
+    let Some(map) = map else { return Ok(()) };
     let prefix = map.geometry.prefix(Header::new(drawn_until, map_frame(name, robot)));
     output.map.send_grid(name, &prefix, |blank| blank.copy_cells(&map.cells))
+}
+
+/// Sends the pose in the map for a pose by odometry.
+fn send_pose(
+    name: &str,
+    robot: &Robot,
+    time: LogTime,
+    odometry: &Pose2,
+    output: &Output<Drawn>,
+) -> Result<(), StageError> {
+    let Some(pose) = robot.in_map(time, odometry) else { return Ok(()) };
+    let header = Header::new(time, map_frame(name, robot));
+    output.pose.send(name, &PoseStamped { header, pose: pose.into() }.into())
+}
+
+fn too_large(name: &str) -> String {
+    format!("scans of {name} were left out: its map would get too large")
 }
 
 /// Frame of a robot's map: that of its poses, or else the usual one.

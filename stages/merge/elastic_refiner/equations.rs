@@ -1,12 +1,10 @@
 //! Normal equations of all nodes of all maps, and their solution.
 
 use super::ElasticRefinerParameters;
-use super::block_cholesky::{BlockCholesky, SelectedInverse};
 use super::body::Body;
-use super::dissection::Dissection;
-use super::factoring::{Columns, factor};
 use crate::shared::deformation::Deformation;
 use crate::shared::geometry::Point2;
+use crate::shared::sparse::{BlockCholesky, Columns, Dissection, SelectedInverse, factor};
 use nalgebra::{Matrix3, Vector2, Vector3};
 use std::sync::Arc;
 

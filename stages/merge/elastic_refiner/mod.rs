@@ -20,14 +20,11 @@
 //! gradient.
 
 mod anchor;
-mod block_cholesky;
 mod body;
 mod contacts;
-mod dissection;
 mod drift;
 mod equations;
 mod evidence;
-mod factoring;
 mod parameters;
 mod refine;
 mod sharpness;

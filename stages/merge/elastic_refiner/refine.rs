@@ -3,12 +3,12 @@
 use super::ElasticRefinerParameters;
 use super::body::Body;
 use super::contacts::{Contacts, DeformedBody, contacts};
-use super::dissection::Dissection;
 use super::drift::{Drift, drift};
 use super::equations::{Equations, deformation_cost};
 use super::evidence::{Round, gain};
 use crate::shared::deformation::Deformation;
 use crate::shared::geometry::Point2;
+use crate::shared::sparse::Dissection;
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 use std::sync::Arc;

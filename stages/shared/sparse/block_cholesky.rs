@@ -5,14 +5,14 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Lower factor `L` of a matrix `L L^T`.
 #[derive(Clone, Debug)]
-pub(super) struct BlockCholesky {
+pub(crate) struct BlockCholesky {
     /// Start of each column in `blocks`.
-    pub(super) starts: Vec<usize>,
+    pub(crate) starts: Vec<usize>,
     /// Row of each block: in each column the diagonal comes first, and then those below.
-    pub(super) rows: Vec<usize>,
-    pub(super) blocks: Vec<Matrix3<f64>>,
+    pub(crate) rows: Vec<usize>,
+    pub(crate) blocks: Vec<Matrix3<f64>>,
     /// Inverse of each diagonal block.
-    pub(super) inverses: Vec<Matrix3<f64>>,
+    pub(crate) inverses: Vec<Matrix3<f64>>,
 }
 
 impl BlockCholesky {
@@ -23,13 +23,13 @@ impl BlockCholesky {
     }
 
     /// Logarithm of the determinant of the matrix.
-    pub(super) fn log_determinant(&self) -> f64 {
+    pub(crate) fn log_determinant(&self) -> f64 {
         let diagonals = self.starts.iter().take(self.inverses.len()).map(|&own| self.blocks[own].diagonal());
         diagonals.map(|diagonal| 2.0 * diagonal.map(f64::ln).sum()).sum()
     }
 
     /// Solves the system with the right-hand side `right`.
-    pub(super) fn solve(&self, right: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    pub(crate) fn solve(&self, right: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let mut solution = right.to_vec();
         for column in 0..solution.len() {
             solution[column] = self.inverses[column] * solution[column];
@@ -49,7 +49,7 @@ impl BlockCholesky {
     /// Computes the blocks of the inverse at which the factor has any, by the recursion of Takahashi, Fagan and Chen
     /// (1973). It takes about as long as the factorization; the whole inverse, which is dense, would take one
     /// solution for each row.
-    pub(super) fn selected_inverse(&self) -> SelectedInverse<'_> {
+    pub(crate) fn selected_inverse(&self) -> SelectedInverse<'_> {
         let mut values = vec![Matrix3::zeros(); self.blocks.len()];
         // Sums of one column, as the recursion needs them: one for each row below the diagonal.
         let mut sums: Vec<Matrix3<f64>> = Vec::new();
@@ -87,7 +87,7 @@ impl BlockCholesky {
 
 /// Blocks of the inverse of a matrix at which its factor has any.
 #[derive(Clone, Debug)]
-pub(super) struct SelectedInverse<'a> {
+pub(crate) struct SelectedInverse<'a> {
     factor: &'a BlockCholesky,
     /// In the order of the factor's blocks.
     values: Vec<Matrix3<f64>>,
@@ -95,7 +95,7 @@ pub(super) struct SelectedInverse<'a> {
 
 impl SelectedInverse<'_> {
     /// A block of the inverse; zeros where the factor has none.
-    pub(super) fn at(&self, row: usize, column: usize) -> Matrix3<f64> {
+    pub(crate) fn at(&self, row: usize, column: usize) -> Matrix3<f64> {
         let (low, high) = (row.max(column), row.min(column));
         let (start, end) = (self.factor.starts[high], self.factor.starts[high + 1]);
         let place = self.factor.rows[start..end].binary_search(&low);

@@ -8,25 +8,25 @@ const LEAST_NODES: usize = 16;
 
 /// Elimination order of nodes, and its independent parts.
 #[derive(Clone, Debug)]
-pub(super) struct Dissection {
+pub(crate) struct Dissection {
     /// Position of each node in the order.
-    pub(super) places: Vec<usize>,
+    pub(crate) places: Vec<usize>,
     /// The whole order.
-    pub(super) whole: Part,
+    pub(crate) whole: Part,
 }
 
 /// A contiguous part of the order.
 #[derive(Clone, Debug)]
-pub(super) struct Part {
+pub(crate) struct Part {
     /// Positions of all its nodes.
-    pub(super) places: Range<usize>,
+    pub(crate) places: Range<usize>,
     /// Two parts without a common equation, at its beginning; the rest separates them. None if it is not divided.
-    pub(super) sides: Option<Box<[Part; 2]>>,
+    pub(crate) sides: Option<Box<[Part; 2]>>,
 }
 
 impl Part {
     /// A part that is not divided.
-    pub(super) fn undivided(places: Range<usize>) -> Self {
+    pub(crate) fn undivided(places: Range<usize>) -> Self {
         Self { places, sides: None }
     }
 }
@@ -35,7 +35,7 @@ impl Dissection {
     /// Computes an order with a sparse factor: the nodes on one side of a line, those on the other, and last those of
     /// one side with equations to the other; and so on within each side (nested dissection, George 1973, by the
     /// positions of the nodes). `neighbours` are for each node those with a common equation.
-    pub(super) fn new(at: &[Point2], neighbours: &[Vec<usize>]) -> Self {
+    pub(crate) fn new(at: &[Point2], neighbours: &[Vec<usize>]) -> Self {
         let mut division = Division { at, neighbours, side_of: vec![0; at.len()], sides: 0, order: Vec::new() };
         let whole = division.divide((0..at.len()).collect());
         let mut places = vec![0; at.len()];

@@ -12,7 +12,7 @@ use std::ops::Range;
 
 /// Lower triangle of a symmetric matrix by columns: the entries of each in any order, and several for one position,
 /// which are summed.
-pub(super) type Columns = Vec<Vec<(usize, Matrix3<f64>)>>;
+pub(crate) type Columns = Vec<Vec<(usize, Matrix3<f64>)>>;
 
 /// No column.
 const NONE: usize = usize::MAX;
@@ -23,7 +23,7 @@ const LEAST_TOGETHER: usize = 8;
 
 /// Factors a matrix whose columns are in an order with the independent parts `whole`. `None` if it is not positive
 /// definite.
-pub(super) fn factor(columns: &Columns, whole: &Part) -> Option<BlockCholesky> {
+pub(crate) fn factor(columns: &Columns, whole: &Part) -> Option<BlockCholesky> {
     let (starts, rows) = pattern(columns);
     let mut blocks = vec![Matrix3::zeros(); rows.len()];
     let mut inverses = vec![Matrix3::zeros(); columns.len()];

@@ -1,0 +1,182 @@
+//! The drive of a robot that has odometry only, or nothing but scans: its poses are found by registration of its scans.
+
+use super::{BaseBeam, ScanBeams, ScanMap, ScanMapperParameters, TooLarge};
+use crate::mapping::slam::{ScanPoint, Trajectory, scan_points};
+use crate::shared::geometry::{Point2, Pose2, pose, wrap_angle};
+use gridweave_runtime::message::LogTime;
+
+/// Largest share of the scans that may lie on no others, for a map to be drawn.
+const MAX_UNMATCHED: f64 = 0.2;
+/// Least number of scans before which the share says nothing.
+const LEAST_SCANS: usize = 20;
+
+/// A scan whose beams were all sent from one pose of the base.
+struct StillScan {
+    time: LogTime,
+    /// Pose of the base by odometry.
+    odometry: Pose2,
+    transform_base_lidar: Pose2,
+    beams: Vec<StillBeam>,
+}
+
+/// A beam, in single precision: all scans of a drive are kept.
+#[derive(Clone, Copy)]
+struct StillBeam {
+    angle: f32,
+    range: f32,
+    is_hit: bool,
+}
+
+/// The scans of a robot with their poses, and the map that is drawn from them.
+pub(super) struct Drive {
+    trajectory: Trajectory,
+    scans: Vec<StillScan>,
+    map: ScanMap,
+    /// Number of scans in the map.
+    drawn: usize,
+    first_unmatched: Option<LogTime>,
+}
+
+/// Scans of a drive that lie on no others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct LostDrive {
+    /// How many.
+    pub(super) unmatched: usize,
+    /// Of how many.
+    pub(super) scans: usize,
+    /// Time of the first of them.
+    pub(super) since: LogTime,
+}
+
+impl Drive {
+    pub(super) fn new(parameters: &ScanMapperParameters) -> Self {
+        Self {
+            trajectory: Trajectory::new(parameters.odometry_deviation),
+            scans: Vec::new(),
+            map: ScanMap::new(parameters),
+            drawn: 0,
+            first_unmatched: None,
+        }
+    }
+
+    /// Whether the robot has moved so far from the last scan, to the pose `odometry`, that another one is to be added.
+    pub(super) fn is_due(&self, odometry: &Pose2, parameters: &ScanMapperParameters) -> bool {
+        self.scans.last().is_none_or(|last| {
+            let moved = last.odometry.inv_mul(odometry);
+            moved.translation.vector.norm() >= parameters.step || moved.rotation.angle().abs() >= parameters.step_yaw
+        })
+    }
+
+    /// Adds a scan that was made at the pose `odometry`, without motion. Returns whether it lies on the earlier ones.
+    pub(super) fn add(&mut self, time: LogTime, odometry: &Pose2, scan: &ScanBeams) -> bool {
+        let moved = self.scans.last().map_or_else(Pose2::identity, |last| last.odometry.inv_mul(odometry));
+        let before = self.trajectory.unmatched();
+        if self.trajectory.add(&moved, points(scan)) {
+            self.forget_map();
+        }
+        let still =
+            |beam: &BaseBeam| StillBeam { angle: beam.angle as f32, range: beam.range as f32, is_hit: beam.is_hit };
+        let beams = scan.beams.iter().map(still).collect();
+        let transform_base_lidar = scan.transform_base_lidar;
+        self.scans.push(StillScan { time, odometry: *odometry, transform_base_lidar, beams });
+        let is_matched = self.trajectory.unmatched() == before;
+        if !is_matched {
+            self.first_unmatched.get_or_insert(time);
+        }
+        is_matched
+    }
+
+    /// Registers a scan without adding it, from the pose `guess` with the given standard deviations of position and yaw.
+    /// The pose in the frame of odometry; `None` if the scan lies on no earlier ones.
+    pub(super) fn locate(&self, guess: &Pose2, deviations: [f64; 2], scan: &ScanBeams) -> Option<Pose2> {
+        let last = self.scans.last()?.odometry;
+        Some(last * self.trajectory.locate(&last.inv_mul(guess), deviations, &points(scan))?)
+    }
+
+    /// Looks for the last loop closures, when there will be no more scans.
+    pub(super) fn finish(&mut self) {
+        if self.trajectory.finish_submap() {
+            self.forget_map();
+        }
+    }
+
+    /// Scans have moved: the map is drawn again.
+    fn forget_map(&mut self) {
+        self.map.clear();
+        self.drawn = 0;
+    }
+
+    /// Pose of a scan in the map, whose frame is that of odometry at the first scan.
+    fn pose(&self, scan: usize) -> Pose2 {
+        self.scans[0].odometry * self.trajectory.poses()[scan]
+    }
+
+    /// Draws the scans that are not in the map.
+    ///
+    /// # Errors
+    /// The map would get too large; it stays as it was, without the scan.
+    pub(super) fn draw(&mut self) -> Result<(), TooLarge> {
+        let mut outcome = Ok(());
+        let mut beams = ScanBeams { transform_base_lidar: Pose2::identity(), beams: Vec::new(), duration: 0.0 };
+        while let Some(scan) = self.scans.get(self.drawn) {
+            beams.transform_base_lidar = scan.transform_base_lidar;
+            beams.beams.clear();
+            beams.beams.extend(scan.beams.iter().map(|beam| BaseBeam {
+                angle: f64::from(beam.angle),
+                range: f64::from(beam.range),
+                is_hit: beam.is_hit,
+                delay: 0.0,
+            }));
+            let at = self.pose(self.drawn);
+            self.drawn += 1;
+            outcome = outcome.and(self.map.draw(&beams, |_| Some(at)));
+        }
+        outcome
+    }
+
+    /// The map of the scans that were drawn.
+    pub(super) fn map(&self) -> &ScanMap {
+        &self.map
+    }
+
+    /// Time of the first and of the last scan.
+    pub(super) fn times(&self) -> Option<[LogTime; 2]> {
+        Some([self.scans.first()?.time, self.scans.last()?.time])
+    }
+
+    /// Pose in the map for a pose by odometry at a time: relative to the scan before it, and with the difference
+    /// between odometry and registration up to the next one in proportion to the time.
+    pub(super) fn in_map(&self, time: LogTime, odometry: &Pose2) -> Pose2 {
+        let next = self.scans.partition_point(|scan| scan.time <= time);
+        let Some(before) = next.checked_sub(1) else { return *odometry };
+        let last = &self.scans[before];
+        let moved = last.odometry.inv_mul(odometry);
+        let start = self.pose(before);
+        let Some(after) = self.scans.get(next) else { return start * moved };
+        let by_odometry = last.odometry.inv_mul(&after.odometry);
+        let registered = start.inv_mul(&self.pose(next));
+        let share = time.seconds_since(last.time) / after.time.seconds_since(last.time);
+        let off = registered.translation.vector - by_odometry.translation.vector;
+        let turned = wrap_angle(registered.rotation.angle() - by_odometry.rotation.angle());
+        let place = moved.translation.vector + off * share;
+        start * pose(place.x, place.y, moved.rotation.angle() + turned * share)
+    }
+
+    /// Whether so many scans lie on no others that there is no map of them.
+    pub(super) fn lost(&self) -> Option<LostDrive> {
+        let (unmatched, scans) = (self.trajectory.unmatched(), self.scans.len());
+        let is_lost = scans >= LEAST_SCANS && unmatched as f64 > MAX_UNMATCHED * scans as f64;
+        let since = self.first_unmatched.filter(|_| is_lost)?;
+        Some(LostDrive { unmatched, scans, since })
+    }
+}
+
+/// The hits of a scan in the frame of the base.
+fn points(scan: &ScanBeams) -> Vec<ScanPoint> {
+    let place = |beam: &BaseBeam| {
+        let (sine, cosine) = beam.angle.sin_cos();
+        scan.transform_base_lidar * Point2::new(cosine * beam.range, sine * beam.range)
+    };
+    let hits: Vec<Point2> = scan.beams.iter().filter(|beam| beam.is_hit).map(place).collect();
+    scan_points(&hits, &scan.transform_base_lidar.translation.vector.into())
+}

@@ -1,0 +1,46 @@
+//! Odometry from the scans alone, for robots that have no other.
+
+use super::ScanBeams;
+use super::drive::Drive;
+use crate::shared::geometry::{Pose2, pose};
+use gridweave_runtime::message::LogTime;
+
+/// Standard deviations of the acceleration of a robot, metres and radians per second squared: what the velocity may
+/// change between two scans.
+const ACCELERATION: [f64; 2] = [1.0, 2.0];
+/// Least standard deviations of the motion between two scans, metres and radians.
+const LEAST_DEVIATIONS: [f64; 2] = [0.03, 0.02];
+/// Longest time over which a velocity is believed, seconds.
+const LONGEST_GAP: f64 = 1.0;
+
+/// Poses of a robot by its scans: each scan is registered on the earlier ones from where the robot would be at the
+/// velocity between the last two.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ScanOdometry {
+    last: Option<(LogTime, Pose2)>,
+    /// Metres and radians per second, in the frame of the base.
+    velocity: [f64; 3],
+}
+
+impl ScanOdometry {
+    /// The pose at a scan, in the frame of the first one.
+    pub(super) fn pose(&mut self, time: LogTime, scan: &ScanBeams, drive: &Drive) -> Pose2 {
+        let Some((before, last)) = self.last else {
+            self.last = Some((time, Pose2::identity()));
+            return Pose2::identity();
+        };
+        let gap = time.seconds_since(before).max(0.0);
+        let [x, y, turn] = self.velocity.map(|velocity| velocity * gap.min(LONGEST_GAP));
+        let guess = last * pose(x, y, turn);
+        let deviations =
+            [0, 1].map(|axis| LEAST_DEVIATIONS[axis] + 0.5 * ACCELERATION[axis] * gap.min(LONGEST_GAP).powi(2));
+        // Where the scan lies on no other one, the robot is taken to go on as it did.
+        let found = drive.locate(&guess, deviations, scan).unwrap_or(guess);
+        if gap > 0.0 {
+            let moved = last.inv_mul(&found);
+            self.velocity = [moved.translation.x, moved.translation.y, moved.rotation.angle()].map(|by| by / gap);
+        }
+        self.last = Some((time, found));
+        found
+    }
+}

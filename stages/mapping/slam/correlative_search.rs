@@ -1,0 +1,223 @@
+//! Search of the pose of a scan within a window, by its correlation with a likelihood field.
+
+use super::likelihood_field::{CELL, LEVELS, LikelihoodField};
+use crate::shared::geometry::{Point2, Pose2, pose, wrap_angle};
+use nalgebra::{Matrix3, Vector3};
+
+/// What is known of a pose before the search.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct PosePrior {
+    /// Mean.
+    pub(super) mean: Pose2,
+    /// Inverse of the covariance of (x, y, yaw) in the frame in which the mean is given; metres and radians.
+    pub(super) information: Matrix3<f64>,
+    /// Half the window along x, y and yaw, metres and radians.
+    pub(super) window: [f64; 3],
+}
+
+/// A pose that the search has found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct FoundPose {
+    /// The pose.
+    pub(super) pose: Pose2,
+    /// Mean value of the likelihood field at the points, 0 to 1.
+    pub(super) response: f64,
+    /// Logarithm of the posterior probability, but for a constant.
+    pub(super) score: f64,
+}
+
+/// A pose around which nothing is searched: the second best is not the best's neighbour.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Excluded {
+    /// The pose.
+    pub(super) pose: Pose2,
+    /// Distance, metres.
+    pub(super) distance: f64,
+    /// Turn, radians.
+    pub(super) turn: f64,
+}
+
+/// Moves of one rotation of the scan: a square of cells.
+#[derive(Clone, Copy)]
+struct Node {
+    rotation: usize,
+    level: usize,
+    /// Least move, cells.
+    offset: [i32; 2],
+    bound: f64,
+}
+
+/// Finds the pose with the highest posterior: `gain` times the sum of the likelihood field at the points, less half
+/// the squared deviation from the prior. It is exact on a grid of cells of the field and of rotations by which the
+/// farthest points move by a cell (Olson 2009, "Real-time correlative scan matching"; branch and bound as in Hess et
+/// al. 2016). Poses with a response below `least` are left out. `None` if there are no others, or no points.
+pub(super) fn search(
+    field: &LikelihoodField,
+    points: &[Point2],
+    prior: &PosePrior,
+    gain: f64,
+    least: f64,
+    excluded: Option<&Excluded>,
+) -> Option<FoundPose> {
+    if points.is_empty() {
+        return None;
+    }
+    let farthest = points.iter().map(|point| point.coords.norm()).fold(CELL, f64::max);
+    let step = (CELL / farthest).max(0.004);
+    let turns = (prior.window[2] / step).ceil() as i32;
+    let mean = prior.mean;
+    let yaw = mean.rotation.angle();
+    let rotated: Vec<(f64, Vec<[i32; 2]>)> = (-turns..=turns)
+        .map(|turn| {
+            let turn = f64::from(turn) * step;
+            let at = pose(mean.translation.x, mean.translation.y, yaw + turn);
+            (turn, points.iter().map(|point| field.cell(&(at * point))).collect())
+        })
+        .collect();
+    let half = [0, 1].map(|axis| (prior.window[axis] / CELL).ceil() as i32);
+    let scale = gain / 255.0;
+    let of_turn = prior.information_of_turn();
+    let least = (least * 255.0 * points.len() as f64).ceil() as u32;
+    let bound = |rotation: usize, level: usize, offset: [i32; 2]| {
+        let (turn, cells) = &rotated[rotation];
+        let deviation = match level {
+            0 => {
+                let by = Vector3::new(f64::from(offset[0]) * CELL, f64::from(offset[1]) * CELL, *turn);
+                by.dot(&(prior.information * by))
+            }
+            // The square has a move that fits the turn best, at most.
+            _ => of_turn * turn * turn,
+        };
+        let sum = field.sum(level, cells, offset);
+        if sum < least { f64::NEG_INFINITY } else { scale * f64::from(sum) - 0.5 * deviation }
+    };
+    let is_excluded = |node: &Node| {
+        excluded.is_some_and(|excluded| {
+            let place = mean.translation.vector + nalgebra::Vector2::from(node.offset.map(f64::from)) * CELL;
+            let turn = wrap_angle(yaw + rotated[node.rotation].0 - excluded.pose.rotation.angle());
+            (place - excluded.pose.translation.vector).norm() < excluded.distance && turn.abs() < excluded.turn
+        })
+    };
+    let widest = half.into_iter().max().unwrap_or(0).max(1);
+    let top = (0..LEVELS).find(|level| 1 << level > widest).unwrap_or(LEVELS - 1);
+    let mut open = Vec::new();
+    for rotation in 0..rotated.len() {
+        for x in (-half[0]..=half[0]).step_by(1 << top) {
+            for y in (-half[1]..=half[1]).step_by(1 << top) {
+                let bound = bound(rotation, top, [x, y]);
+                if bound > f64::NEG_INFINITY {
+                    open.push(Node { rotation, level: top, offset: [x, y], bound });
+                }
+            }
+        }
+    }
+    // Depth first, the best last; ties in the order of the window, whatever the sort does.
+    open.sort_by(|a, b| a.bound.total_cmp(&b.bound));
+    let mut best: Option<Node> = None;
+    while let Some(node) = open.pop() {
+        if best.is_some_and(|best| best.bound >= node.bound) {
+            continue;
+        }
+        if node.level == 0 {
+            if !is_excluded(&node) {
+                best = Some(node);
+            }
+            continue;
+        }
+        let level = node.level - 1;
+        let side = 1 << level;
+        let mut parts = [[0, 0], [side, 0], [0, side], [side, side]].map(|[right, up]| {
+            let offset = [node.offset[0] + right, node.offset[1] + up];
+            Node { rotation: node.rotation, level, offset, bound: bound(node.rotation, level, offset) }
+        });
+        parts.sort_by(|a, b| a.bound.total_cmp(&b.bound));
+        let is_inside =
+            |node: &Node| node.offset[0] <= half[0] && node.offset[1] <= half[1] && node.bound > f64::NEG_INFINITY;
+        open.extend(parts.into_iter().filter(is_inside));
+    }
+    let best = best?;
+    let (turn, cells) = &rotated[best.rotation];
+    let [x, y] = best.offset.map(|cells| f64::from(cells) * CELL);
+    let sum = f64::from(field.sum(0, cells, best.offset));
+    Some(FoundPose {
+        pose: pose(mean.translation.x + x, mean.translation.y + y, yaw + turn),
+        response: sum / (255.0 * points.len() as f64),
+        score: best.bound,
+    })
+}
+
+impl PosePrior {
+    /// Information on the yaw alone, whatever the position is: the inverse of its variance.
+    fn information_of_turn(&self) -> f64 {
+        let of_position = self.information.fixed_view::<2, 2>(0, 0).into_owned();
+        let mixed = self.information.fixed_view::<2, 1>(0, 2).into_owned();
+        let by_position = of_position.try_inverse().map(|inverse| (mixed.transpose() * inverse * mixed).x);
+        by_position.map_or(0.0, |explained| (self.information.m33 - explained).max(0.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector2;
+
+    /// The corner of a room, with a niche.
+    fn room() -> Vec<Point2> {
+        let along = |from: [f64; 2], to: [f64; 2]| {
+            let (from, to) = (Vector2::from(from), Vector2::from(to));
+            let steps = ((to - from).norm() / 0.05) as i32;
+            (0..steps).map(move |step| Point2::from(from + (to - from) * (f64::from(step) / f64::from(steps))))
+        };
+        along([-3.0, -2.0], [4.0, -2.0])
+            .chain(along([4.0, -2.0], [4.0, 3.0]))
+            .chain(along([-3.0, -2.0], [-3.0, 0.5]))
+            .chain(along([1.0, 2.0], [2.5, 2.0]))
+            .collect()
+    }
+
+    fn field() -> LikelihoodField {
+        LikelihoodField::new(room().into_iter(), &Point2::new(-6.0, -6.0), &Point2::new(7.0, 7.0))
+    }
+
+    #[test]
+    fn a_scan_is_found_where_it_was_made() {
+        let truth = pose(0.42, -0.3, 0.21);
+        let points: Vec<Point2> = room().iter().map(|point| truth.inverse() * point).collect();
+        let prior = PosePrior {
+            mean: pose(0.0, 0.0, 0.0),
+            information: Matrix3::from_diagonal(&Vector3::new(4.0, 4.0, 10.0)),
+            window: [1.0, 1.0, 0.5],
+        };
+        let found = search(&field(), &points, &prior, 0.3, 0.0, None).unwrap();
+        let off = truth.inverse() * found.pose;
+        assert!(off.translation.vector.norm() < 0.06 && off.rotation.angle().abs() < 0.02, "{found:?}");
+        assert!(found.response > 0.8, "{found:?}");
+        let excluded = Excluded { pose: found.pose, distance: 0.5, turn: 0.2 };
+        let second = search(&field(), &points, &prior, 0.3, 0.0, Some(&excluded)).unwrap();
+        assert!(second.response < 0.7 * found.response, "{second:?}");
+        assert!(search(&field(), &[], &prior, 0.3, 0.0, None).is_none());
+    }
+
+    #[test]
+    fn branch_and_bound_finds_what_an_exhaustive_search_does() {
+        let points: Vec<Point2> = room().iter().map(|point| pose(0.1, 0.2, 0.05).inverse() * point).collect();
+        let information = Matrix3::new(9.0, 2.0, 1.0, 2.0, 5.0, -1.0, 1.0, -1.0, 20.0);
+        let prior = PosePrior { mean: pose(0.3, 0.0, 0.0), information, window: [0.4, 0.4, 0.1] };
+        let field = field();
+        let found = search(&field, &points, &prior, 0.1, 0.0, None).unwrap();
+        let farthest = points.iter().map(|point| point.coords.norm()).fold(CELL, f64::max);
+        let mut most = f64::NEG_INFINITY;
+        let turns = (0.1 * farthest / CELL).ceil() as i32;
+        for turn in -turns..=turns {
+            let turn = f64::from(turn) * CELL / farthest;
+            let at = pose(0.3, 0.0, turn);
+            let cells: Vec<[i32; 2]> = points.iter().map(|point| field.cell(&(at * point))).collect();
+            for (x, y) in (-8..=8).flat_map(|x| (-8..=8).map(move |y| (x, y))) {
+                let by = Vector3::new(f64::from(x) * CELL, f64::from(y) * CELL, turn);
+                let score = 0.1 / 255.0 * f64::from(field.sum(0, &cells, [x, y])) - 0.5 * by.dot(&(information * by));
+                most = most.max(score);
+            }
+        }
+        assert!((found.score - most).abs() < 1e-9, "{} {most}", found.score);
+    }
+}

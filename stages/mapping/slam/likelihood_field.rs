@@ -1,0 +1,122 @@
+//! The likelihood field of a set of points: how near a place is to the nearest of them.
+
+use crate::shared::geometry::Point2;
+use nalgebra::Vector2;
+
+/// Side of a cell, metres.
+pub(super) const CELL: f64 = 0.05;
+/// Standard deviation of a hit about the wall, metres.
+const DEVIATION: f64 = 0.06;
+/// Cells to each side that a point reaches.
+const REACH: i64 = 3;
+/// Levels of the pyramid: the highest has the maximum of 32 by 32 cells.
+pub(super) const LEVELS: usize = 6;
+
+/// The likelihood field `exp(-d^2 / 2 s^2)` of the distance d to the nearest point (Thrun, Burgard and Fox,
+/// "Probabilistic Robotics", section 6.4), with the maxima of its neighbourhoods, for branch and bound (Hess et al.
+/// 2016, equation 17).
+#[derive(Clone, Debug)]
+pub(super) struct LikelihoodField {
+    corner: Point2,
+    width: usize,
+    height: usize,
+    /// Level k has for each cell the maximum of the 2^k by 2^k cells from it to higher x and y. 255 is 1.
+    levels: Vec<Vec<u8>>,
+}
+
+impl LikelihoodField {
+    /// Draws the points that lie in the rectangle between two corners.
+    pub(super) fn new(points: impl Iterator<Item = Point2>, low: &Point2, high: &Point2) -> Self {
+        let cells = |extent: f64| (extent / CELL).ceil().max(1.0) as usize;
+        let (width, height) = (cells(high.x - low.x), cells(high.y - low.y));
+        let mut field = Self { corner: *low, width, height, levels: Vec::with_capacity(LEVELS) };
+        let mut cells = vec![0u8; width * height];
+        for point in points {
+            field.stamp(&mut cells, &point);
+        }
+        field.levels.push(cells);
+        for level in 1..LEVELS {
+            let below = &field.levels[level - 1];
+            let above = field.maxima(below, 1 << (level - 1));
+            field.levels.push(above);
+        }
+        field
+    }
+
+    /// Raises the cells around a point to their likelihood.
+    fn stamp(&self, cells: &mut [u8], point: &Point2) {
+        let at = (point - self.corner) / CELL;
+        let (column, row) = (at.x.floor() as i64, at.y.floor() as i64);
+        let scale = -0.5 * (CELL / DEVIATION).powi(2);
+        for y in (row - REACH).max(0)..=(row + REACH).min(self.height as i64 - 1) {
+            for x in (column - REACH).max(0)..=(column + REACH).min(self.width as i64 - 1) {
+                let apart = Vector2::new(x as f64 + 0.5, y as f64 + 0.5) - at;
+                let value = (255.0 * (scale * apart.norm_squared()).exp()).round() as u8;
+                let cell = &mut cells[y as usize * self.width + x as usize];
+                *cell = value.max(*cell);
+            }
+        }
+    }
+
+    /// The maxima of a level and of the same moved by `step` cells to the left, down, and both.
+    fn maxima(&self, below: &[u8], step: usize) -> Vec<u8> {
+        let (width, height) = (self.width, self.height);
+        let mut along = below.to_vec();
+        for (row, from) in along.chunks_exact_mut(width).zip(below.chunks_exact(width)) {
+            for (value, other) in row.iter_mut().zip(&from[step.min(width)..]) {
+                *value = (*value).max(*other);
+            }
+        }
+        let mut both = along.clone();
+        let start = step.min(height) * width;
+        for (value, other) in both.iter_mut().zip(&along[start..]) {
+            *value = (*value).max(*other);
+        }
+        both
+    }
+
+    /// The cell of a point: column and row, which may be outside.
+    pub(super) fn cell(&self, point: &Point2) -> [i32; 2] {
+        let at = (point - self.corner) / CELL;
+        [at.x.floor() as i32, at.y.floor() as i32]
+    }
+
+    /// Sum of the values of a level at cells that are moved by `offset`; 255 for each on a wall.
+    pub(super) fn sum(&self, level: usize, cells: &[[i32; 2]], offset: [i32; 2]) -> u32 {
+        let values = &self.levels[level];
+        let (width, height) = (self.width as i32, self.height as i32);
+        // A maximum that begins outside may reach inside.
+        let least = if level == 0 { 0 } else { 1 - (1 << level) };
+        let mut sum = 0;
+        for [column, row] in cells {
+            let (column, row) = (column + offset[0], row + offset[1]);
+            if column >= least && row >= least && column < width && row < height {
+                sum += u32::from(values[row.max(0) as usize * self.width + column.max(0) as usize]);
+            }
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_level_bounds_all_moves_of_the_cells_below() {
+        let wall: Vec<Point2> = (0..40).map(|step| Point2::new(0.1 * f64::from(step), 1.0)).collect();
+        let field = LikelihoodField::new(wall.iter().copied(), &Point2::new(-1.0, -1.0), &Point2::new(5.0, 3.0));
+        let cells: Vec<[i32; 2]> = wall.iter().map(|point| field.cell(&(point + Vector2::new(0.3, -0.4)))).collect();
+        for level in 1..LEVELS {
+            let side = 1 << level;
+            for start in [[-40, -40], [-8, -4], [0, 0], [3, 5]] {
+                let bound = field.sum(level, &cells, start);
+                for (right, up) in (0..side).flat_map(|right| (0..side).map(move |up| (right, up))) {
+                    assert!(field.sum(0, &cells, [start[0] + right, start[1] + up]) <= bound, "{level} {start:?}");
+                }
+            }
+        }
+        let on_wall: Vec<[i32; 2]> = wall.iter().map(|point| field.cell(point)).collect();
+        assert!(field.sum(0, &on_wall, [0, 0]) > 40 * 200);
+    }
+}

@@ -1,0 +1,211 @@
+//! The map around a robot, on which its scans are registered.
+
+use super::likelihood_field::LikelihoodField;
+use super::scan_points::{SPACING, ScanPoint};
+use crate::shared::geometry::{Point2, PointIndex, Pose2, quarter_turn};
+use crate::shared::walls::{CORRELATION_LENGTH, DEVIATION, LEAST_NORMAL_AGREEMENT};
+use nalgebra::{Matrix3, Vector2, Vector3};
+use std::f64::consts::TAU;
+
+/// Side of the cells in which points of one direction are averaged, metres.
+const SURFACE_CELL: f64 = 0.1;
+/// Sectors of directions.
+const SECTORS: f64 = 12.0;
+/// Distances within which a point is matched with a surface, metres: from the search's cells down to the noise.
+const RADII: [f64; 6] = [0.3, 0.25, 0.2, 0.15, 0.15, 0.15];
+/// Standard deviation in the weight of a match, as a share of the radius (Welsch).
+const WEIGHT_WIDTH: f64 = 0.5;
+
+/// A piece of a wall: the mean of the points of several scans.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Surface {
+    place: Point2,
+    normal: Vector2<f64>,
+}
+
+/// The points of several scans in one frame.
+#[derive(Clone, Debug)]
+pub struct LocalMap {
+    points: Vec<Point2>,
+    surfaces: Vec<Surface>,
+    index: PointIndex,
+    /// Points without a normal: legs of tables, corners, and clutter.
+    spots: PointIndex,
+}
+
+/// Registration of points on a local map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Match {
+    /// Pose of the points' frame in the map's.
+    pub pose: Pose2,
+    /// Inverse of the covariance of (x, y, yaw) in the map's frame by the matches alone.
+    pub information: Matrix3<f64>,
+    /// Share of the points with a normal that lie on a surface of the same direction.
+    pub matched: f64,
+}
+
+impl LocalMap {
+    /// Makes a map of scans at their poses.
+    pub fn new<'a>(scans: impl Iterator<Item = (Pose2, &'a [ScanPoint])>) -> Self {
+        let mut points = Vec::new();
+        let mut keyed: Vec<([i32; 3], Surface)> = Vec::new();
+        let mut spots: Vec<Point2> = Vec::new();
+        for (pose, scan) in scans {
+            for point in scan {
+                let place = pose * point.place;
+                points.push(place);
+                if point.normal.is_none() {
+                    spots.push(place);
+                }
+                if let Some(normal) = point.normal {
+                    let normal = pose * normal;
+                    let sector = (normal.y.atan2(normal.x) / TAU * SECTORS).floor() as i32;
+                    let cell = (place / SURFACE_CELL).map(f64::floor);
+                    keyed.push(([cell.x as i32, cell.y as i32, sector], Surface { place, normal }));
+                }
+            }
+        }
+        // A stable sort: the order of the sums is that of the scans.
+        keyed.sort_by_key(|(key, _)| *key);
+        let mean = |group: &[([i32; 3], Surface)]| {
+            let share = 1.0 / group.len() as f64;
+            let place = group.iter().map(|(_, surface)| surface.place.coords * share).sum::<Vector2<f64>>();
+            let normal = group.iter().map(|(_, surface)| surface.normal).sum::<Vector2<f64>>();
+            Surface { place: place.into(), normal: normal.normalize() }
+        };
+        let unsorted: Vec<Surface> = keyed.chunk_by(|(a, _), (b, _)| a == b).map(mean).collect();
+        let places: Vec<Point2> = unsorted.iter().map(|surface| surface.place).collect();
+        let (index, order) = PointIndex::new(&places, SURFACE_CELL);
+        let surfaces = order.into_iter().map(|place| unsorted[place]).collect();
+        let (spots, _) = PointIndex::new(&spots, SURFACE_CELL);
+        Self { points, surfaces, index, spots }
+    }
+
+    /// The likelihood field of the map within a rectangle.
+    pub(super) fn field(&self, low: &Point2, high: &Point2) -> LikelihoodField {
+        LikelihoodField::new(self.points.iter().copied(), low, high)
+    }
+
+    /// Whether there is nothing.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// Registers points on the walls: the distances of the points to the lines of the surfaces are minimised together
+    /// with the deviation from a prior, with weights that fall with the distance (point to line as in Censi 2008, "An
+    /// ICP variant using a point-to-line metric").
+    pub fn register(&self, scan: &[ScanPoint], guess: &Pose2, prior: Option<(&Pose2, &Matrix3<f64>)>) -> Match {
+        let mut pose = *guess;
+        for radius in RADII {
+            let (mut matrix, mut vector, _) = self.equations(scan, &pose, radius);
+            if let Some((mean, information)) = prior {
+                let off = Vector3::new(
+                    mean.translation.x - pose.translation.x,
+                    mean.translation.y - pose.translation.y,
+                    (mean.rotation / pose.rotation).angle(),
+                );
+                matrix += information;
+                vector += information * off;
+            }
+            // Nothing else fixes what no wall does.
+            matrix += Matrix3::identity();
+            let Some(step) = matrix.cholesky().map(|factor| factor.solve(&vector)) else { break };
+            pose.translation.vector += step.xy();
+            pose.rotation *= nalgebra::UnitComplex::new(step.z);
+        }
+        let (information, _, matched) = self.equations(scan, &pose, RADII[RADII.len() - 1]);
+        Match { pose, information, matched }
+    }
+
+    /// Normal equations of a small move (x, y, yaw about the points' frame), and the share of matched points.
+    fn equations(&self, scan: &[ScanPoint], pose: &Pose2, radius: f64) -> (Matrix3<f64>, Vector3<f64>, f64) {
+        let (mut matrix, mut vector) = (Matrix3::zeros(), Vector3::zeros());
+        let (mut with_normal, mut matched) = (0u32, 0u32);
+        // Neighbouring points of a wall are one measurement.
+        let information = SPACING / CORRELATION_LENGTH / (DEVIATION * DEVIATION);
+        let width = WEIGHT_WIDTH * radius;
+        for point in scan {
+            with_normal += 1;
+            let arm = pose.rotation * point.place.coords;
+            let place = pose.translation.vector + arm;
+            let Some(normal) = point.normal else {
+                let Some(nearest) = self.spots.nearest(&place.into(), radius) else { continue };
+                let off = self.spots.points()[nearest.index].coords - place;
+                let weight = information * (-0.5 * off.norm_squared() / (width * width)).exp();
+                matched += 1;
+                for by in [Vector2::x(), Vector2::y()] {
+                    let row = Vector3::new(by.x, by.y, by.dot(&quarter_turn(&arm)));
+                    matrix += weight * row * row.transpose();
+                    vector += weight * off.dot(&by) * row;
+                }
+                continue;
+            };
+            let Some(nearest) = self.index.nearest(&place.into(), radius) else { continue };
+            let surface = &self.surfaces[nearest.index];
+            if surface.normal.dot(&(pose.rotation * normal)) < LEAST_NORMAL_AGREEMENT {
+                continue;
+            }
+            matched += 1;
+            let off = surface.normal.dot(&(surface.place.coords - place));
+            let weight = information * (-0.5 * (off / width).powi(2)).exp();
+            let by = surface.normal;
+            let row = Vector3::new(by.x, by.y, by.dot(&quarter_turn(&arm)));
+            matrix += weight * row * row.transpose();
+            vector += weight * off * row;
+        }
+        (matrix, vector, f64::from(matched) / f64::from(with_normal.max(1)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::geometry::pose;
+
+    /// Walls with their normals, as seen from the inside of a room of 6 by 4 metres.
+    fn walls(sides: &[[f64; 4]]) -> Vec<ScanPoint> {
+        let mut points = Vec::new();
+        for &[x, y, normal_x, normal_y] in sides {
+            let along = Vector2::new(-normal_y, normal_x);
+            for step in -20..=20 {
+                let place = Point2::new(x, y) + along * (SPACING * f64::from(step));
+                points.push(ScanPoint { place, normal: Some(Vector2::new(normal_x, normal_y)) });
+            }
+        }
+        points
+    }
+
+    fn seen_from(pose: &Pose2, points: &[ScanPoint]) -> Vec<ScanPoint> {
+        let into = pose.inverse();
+        points
+            .iter()
+            .map(|point| ScanPoint { place: into * point.place, normal: point.normal.map(|normal| into * normal) })
+            .collect()
+    }
+
+    #[test]
+    fn points_are_registered_to_a_millimetre_and_only_where_walls_say_so() {
+        let room = walls(&[[3.0, 0.0, -1.0, 0.0], [-3.0, 0.0, 1.0, 0.0], [0.0, 2.0, 0.0, -1.0]]);
+        let map = LocalMap::new([(Pose2::identity(), &room[..])].into_iter());
+        let truth = pose(0.11, -0.07, 0.03);
+        let found = map.register(&seen_from(&truth, &room), &Pose2::identity(), None);
+        let off = truth.inverse() * found.pose;
+        assert!(off.translation.vector.norm() < 1e-3 && off.rotation.angle().abs() < 1e-3, "{off}");
+        assert!(found.matched > 0.95);
+
+        // A corridor: nothing tells where along it.
+        let corridor = walls(&[[0.0, 1.0, 0.0, -1.0], [0.0, -1.0, 0.0, 1.0]]);
+        let map = LocalMap::new([(Pose2::identity(), &corridor[..])].into_iter());
+        let found = map.register(&corridor, &pose(0.0, 0.05, 0.0), None);
+        let weakest = found.information.symmetric_eigenvalues().min();
+        assert!(weakest < 1e-6 * found.information.trace(), "{}", found.information);
+        assert!(found.pose.translation.vector.norm() < 1e-3);
+    }
+
+    #[test]
+    fn the_other_face_of_a_wall_is_not_matched() {
+        let map = LocalMap::new([(Pose2::identity(), &walls(&[[1.0, 0.0, -1.0, 0.0]])[..])].into_iter());
+        let found = map.register(&walls(&[[1.05, 0.0, 1.0, 0.0]]), &Pose2::identity(), None);
+        assert_eq!(found.matched, 0.0);
+    }
+}

@@ -1,0 +1,140 @@
+//! Loop closures: submaps that were seen before.
+
+use super::correlative_search::{Excluded, PosePrior, search};
+use super::local_map::LocalMap;
+use super::pose_graph::{Constraint, PoseGraph, turned_information};
+use super::scan_points::ScanPoint;
+use super::scan_registration::{GAIN, reach, thinned};
+use super::trajectory::Keyframe;
+use nalgebra::Matrix3;
+use std::ops::Range;
+
+/// Distance of two submaps up to which they may have walls in common, metres, beyond what they are uncertain.
+const COMMON_DISTANCE: f64 = 6.0;
+/// Half the window of the search in standard deviations, and its bounds, metres and radians.
+const WINDOW: f64 = 3.0;
+const LEAST_WINDOW: [f64; 2] = [0.3, 0.1];
+const LARGEST_WINDOW: [f64; 2] = [4.0, 0.6];
+/// Number of points that the search looks at.
+const SEARCHED_POINTS: usize = 250;
+/// Least mean likelihood of the points at a place that is worth a registration.
+const LEAST_RESPONSE: f64 = 0.35;
+/// Least share of the points on walls of the other submap.
+const LEAST_MATCHED: f64 = 0.5;
+/// Largest likelihood of the points at another place, as a share of that at the best.
+const MAX_SECOND: f64 = 0.85;
+/// What is another place: distance, metres, and turn, radians.
+const OTHER_PLACE: [f64; 2] = [0.5, 0.15];
+/// Share of the information of a registration that a closure has: the submaps are bent themselves.
+const INFORMATION_SHARE: f64 = 0.3;
+
+/// Two submaps that have been found to be at the same place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LoopClosure {
+    /// The pose of the later submap's middle scan in that of the earlier one.
+    pub constraint: Constraint,
+    /// Share of the later submap's points that lie on walls of the earlier one.
+    pub matched: f64,
+    /// Mean likelihood of the points at the pose, 0 to 1.
+    pub response: f64,
+    /// The same at the best other place.
+    pub second: f64,
+}
+
+/// A submap that has just been finished, which may be where the robot was before.
+pub(super) struct Revisit<'a> {
+    pub(super) graph: &'a PoseGraph,
+    pub(super) keyframes: &'a [Keyframe],
+    /// The submaps, as ranges of scans; the last is the one that is looked for.
+    pub(super) submaps: &'a [Range<usize>],
+    /// First scan of the local map: what is in it is registered already.
+    pub(super) recent: usize,
+}
+
+/// Looks for the last submap in all earlier ones that may be at its place.
+pub(super) fn find_loop_closures(revisit: &Revisit<'_>) -> Vec<LoopClosure> {
+    let Some((own, earlier)) = revisit.submaps.split_last() else { return Vec::new() };
+    let centre = middle(own);
+    let earlier: Vec<usize> = (0..earlier.len()).filter(|other| earlier[*other].end <= revisit.recent).collect();
+    if earlier.is_empty() {
+        return Vec::new();
+    }
+    let covariances = revisit.graph.covariances_from(centre);
+    let points = revisit.points_of_submap(own);
+    let found = earlier.into_iter().filter_map(|other| {
+        let covariance = covariances[middle(&revisit.submaps[other])]?;
+        revisit.find_in(other, centre, &points, &covariance)
+    });
+    found.collect()
+}
+
+/// The scan in the middle of a submap, whose pose is that of the submap.
+fn middle(scans: &Range<usize>) -> usize {
+    (scans.start + scans.end) / 2
+}
+
+impl Revisit<'_> {
+    /// Points of a submap in the frame of its middle scan.
+    fn points_of_submap(&self, scans: &Range<usize>) -> Vec<ScanPoint> {
+        let into = self.graph.poses[middle(scans)].inverse();
+        let of_scan = |scan: usize| {
+            let by = into * self.graph.poses[scan];
+            let moved = move |point: &ScanPoint| ScanPoint {
+                place: by * point.place,
+                normal: point.normal.map(|normal| by * normal),
+            };
+            self.keyframes[scan].points.iter().map(moved)
+        };
+        scans.clone().flat_map(of_scan).collect()
+    }
+
+    /// Looks for the points of the scan `centre` and those around it in an earlier submap. `covariance` is that of
+    /// the earlier submap in the frame of `centre`.
+    fn find_in(
+        &self,
+        other: usize,
+        centre: usize,
+        points: &[ScanPoint],
+        covariance: &Matrix3<f64>,
+    ) -> Option<LoopClosure> {
+        let poses = &self.graph.poses;
+        let at = middle(&self.submaps[other]);
+        let deviations = [(covariance.m11 + covariance.m22).sqrt(), covariance.m33.sqrt()];
+        let apart = (poses[at].translation.vector - poses[centre].translation.vector).norm();
+        if apart > COMMON_DISTANCE + 2.0 * deviations[0] {
+            return None;
+        }
+        // The submaps before and after it, too: the later one need not begin where it did.
+        let first = self.submaps[other.saturating_sub(1)].start;
+        let after = self.submaps.get(other + 1).filter(|after| after.end <= self.recent);
+        let last = after.map_or(self.submaps[other].end, |after| after.end);
+        let into = poses[at].inverse();
+        let map = LocalMap::new((first..last).map(|scan| (into * poses[scan], &self.keyframes[scan].points[..])));
+        let mean = into * poses[centre];
+        let half = |axis: usize| (WINDOW * deviations[axis]).clamp(LEAST_WINDOW[axis], LARGEST_WINDOW[axis]);
+        let window = [half(0), half(0), half(1)];
+        let information = turned_information(&covariance.try_inverse()?, &mean.rotation);
+        let prior = PosePrior { mean, information, window };
+        let searched = thinned(points, SEARCHED_POINTS);
+        let [low, high] = reach(&searched, &mean, &window);
+        let field = map.field(&low, &high);
+        let found = search(&field, &searched, &prior, GAIN, LEAST_RESPONSE, None)?;
+        let fit = map.register(points, &found.pose, None);
+        if fit.matched < LEAST_MATCHED {
+            return None;
+        }
+        let excluded = Excluded { pose: found.pose, distance: OTHER_PLACE[0], turn: OTHER_PLACE[1] };
+        let least = MAX_SECOND * found.response;
+        if let Some(_other) = search(&field, &searched, &prior, GAIN, least, Some(&excluded)) {
+            return None;
+        }
+        let constraint = Constraint {
+            from: at,
+            to: centre,
+            transform: fit.pose,
+            information: INFORMATION_SHARE * fit.information,
+            is_loop: true,
+        };
+        Some(LoopClosure { constraint, matched: fit.matched, response: found.response, second: 0.0 })
+    }
+}

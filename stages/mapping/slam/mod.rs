@@ -1,0 +1,31 @@
+//! SLAM of one robot from the scans of its lidar and its odometry.
+//!
+//! Each scan is registered on the [`LocalMap`] of those around it: a correlative search over the uncertainty of
+//! odometry finds the basin (Olson 2009), and point-to-line registration the pose (Censi 2008). Scans are gathered in
+//! submaps of some metres. A finished submap is searched in each earlier one that may be at the same place, by branch
+//! and bound on a likelihood field; what fits, and fits nowhere else, becomes a loop closure. Scans are the nodes of a
+//! pose graph, whose most likely poses are solved for after each closure, with a robust weight for closures.
+//!
+//! The division into a local registration and submaps that are searched for loop closures by branch and bound is that
+//! of Cartographer (Hess et al. 2016, "Real-time loop closure in 2D LIDAR SLAM"); a local map of the last scans, and a
+//! graph with one node for each, that of Karto and slam_toolbox (Konolige et al. 2010; Macenski and Jambrecic 2021).
+//! The noise of odometry is estimated on the way ([`OdometryNoise`]), and is not a parameter to be tuned for each robot.
+
+mod correlative_search;
+mod likelihood_field;
+mod local_map;
+mod loop_closure;
+mod odometry_noise;
+mod pose_graph;
+mod scan_points;
+mod scan_registration;
+#[cfg(test)]
+mod tests;
+mod trajectory;
+
+pub use local_map::LocalMap;
+pub use loop_closure::LoopClosure;
+pub use odometry_noise::OdometryNoise;
+pub use pose_graph::{Constraint, PoseGraph};
+pub use scan_points::{ScanPoint, scan_points};
+pub use trajectory::{Keyframe, Trajectory};

@@ -1,0 +1,136 @@
+//! Drives through a building whose walls are known, with odometry that drifts.
+
+use super::{ScanPoint, Trajectory, scan_points};
+use crate::shared::geometry::{Point2, Pose2, pose};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+const BEAMS: usize = 240;
+/// Standard deviation of a range, metres.
+const NOISE: f64 = 0.01;
+/// Way between two scans, metres.
+const STEP: f64 = 0.3;
+
+/// Walls as segments: a ring of corridors 3 m wide around a block, with niches and pillars at uneven distances.
+fn walls() -> Vec<[Point2; 2]> {
+    let rectangle = |left: f64, low: f64, right: f64, high: f64| {
+        let corners = [(left, low), (right, low), (right, high), (left, high)].map(|(x, y)| Point2::new(x, y));
+        (0..4).map(move |corner| [corners[corner], corners[(corner + 1) % 4]])
+    };
+    let pillars =
+        [(4.0, 0.4), (7.5, 2.6), (13.0, 0.5), (21.5, 4.0), (19.4, 9.0), (16.0, 15.5), (9.0, 13.3), (0.5, 6.0)];
+    let pillars = pillars.into_iter().flat_map(|(x, y)| rectangle(x - 0.25, y - 0.25, x + 0.25, y + 0.25));
+    rectangle(0.0, 0.0, 22.0, 16.0).chain(rectangle(3.0, 3.0, 19.0, 13.0)).chain(pillars).collect()
+}
+
+/// The nearest wall on a beam.
+fn range(walls: &[[Point2; 2]], from: &Pose2, angle: f64) -> f64 {
+    let way = from.rotation * nalgebra::Vector2::new(angle.cos(), angle.sin());
+    let start = from.translation.vector;
+    let hit = |[a, b]: &[Point2; 2]| {
+        let (along, off) = (b - a, a.coords - start);
+        let across = way.perp(&along);
+        let (range, share) = (off.perp(&along) / across, off.perp(&way) / across);
+        (range > 0.0 && (0.0..=1.0).contains(&share)).then_some(range)
+    };
+    walls.iter().filter_map(hit).fold(f64::INFINITY, f64::min)
+}
+
+fn scan(walls: &[[Point2; 2]], at: &Pose2, random: &mut ChaCha8Rng) -> Vec<ScanPoint> {
+    let hit = |beam: usize| {
+        let angle = TAU * beam as f64 / BEAMS as f64;
+        let noise: f64 = (0..12).map(|_| random.random_range(-0.5..0.5)).sum();
+        let range = range(walls, at, angle) + NOISE * noise;
+        Point2::new(range * angle.cos(), range * angle.sin())
+    };
+    let hits: Vec<Point2> = (0..BEAMS).map(hit).collect();
+    scan_points(&hits, &Point2::origin())
+}
+
+/// The way once around the block, and on along the first corridor.
+fn drive() -> Vec<Pose2> {
+    let corners = [(1.5, 1.5), (20.5, 1.5), (20.5, 14.5), (1.5, 14.5), (1.5, 1.5), (12.0, 1.5)];
+    let mut poses = Vec::new();
+    for (leg, ends) in corners.windows(2).enumerate() {
+        let [from, to] = [ends[0], ends[1]].map(|(x, y)| Point2::new(x, y));
+        let steps = ((to - from).norm() / STEP) as usize;
+        for step in 0..steps {
+            let place = from + (to - from) * (step as f64 / steps as f64);
+            poses.push(pose(place.x, place.y, FRAC_PI_2 * leg as f64));
+        }
+    }
+    poses
+}
+
+/// Root of the mean squared distance to the truth, metres; poses are relative to the first.
+fn error(poses: &[Pose2], truth: &[Pose2]) -> f64 {
+    let off = |(found, truth_at): (&Pose2, &Pose2)| {
+        (found.translation.vector - truth[0].inv_mul(truth_at).translation.vector).norm_squared()
+    };
+    (poses.iter().zip(truth).map(off).sum::<f64>() / poses.len() as f64).sqrt()
+}
+
+#[test]
+fn a_drive_around_a_block_is_closed_though_odometry_turns_too_far() {
+    let (walls, truth) = (walls(), drive());
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let mut trajectory = Trajectory::new(0.1);
+    let mut odometry = vec![Pose2::identity()];
+    let mut has_moved = false;
+    for (step, at) in truth.iter().enumerate() {
+        let moved = match step.checked_sub(1) {
+            Some(before) => {
+                let moved = truth[before].inv_mul(at);
+                let (way, turn) = (moved.translation.vector * 1.05, 0.03 * moved.translation.vector.norm());
+                pose(way.x, way.y, moved.rotation.angle() + turn)
+            }
+            None => Pose2::identity(),
+        };
+        if step > 0 {
+            odometry.push(odometry[step - 1] * moved);
+        }
+        has_moved |= trajectory.add(&moved, scan(&walls, at, &mut random));
+    }
+    has_moved |= trajectory.finish_submap();
+    let (before, after) = (error(&odometry, &truth), error(trajectory.poses(), &truth));
+    assert!(before > 3.0, "odometry alone is off by {before} m");
+    assert!(after < 0.15, "{after} m");
+    assert!(has_moved && !trajectory.closures().is_empty());
+    assert_eq!((trajectory.unmatched(), trajectory.poses().len()), (0, truth.len()));
+    for closure in trajectory.closures() {
+        let [from, to] = [closure.constraint.from, closure.constraint.to];
+        let off = truth[from].inv_mul(&truth[to]).inverse() * closure.constraint.transform;
+        assert!(off.translation.vector.norm() < 0.2 && off.rotation.angle().abs() < 0.05, "{closure:?}");
+    }
+}
+
+#[test]
+fn scans_without_anything_in_common_are_unmatched_and_keep_their_poses_by_odometry() {
+    let (walls, truth) = (walls(), drive());
+    let mut random = ChaCha8Rng::seed_from_u64(2);
+    let mut trajectory = Trajectory::new(0.1);
+    for (step, at) in truth.iter().enumerate().take(10) {
+        let moved = if step == 0 { Pose2::identity() } else { pose(40.0, 0.0, 0.0) };
+        trajectory.add(&moved, scan(&walls, at, &mut random));
+    }
+    assert_eq!(trajectory.unmatched(), 9);
+    assert!((trajectory.poses()[9].translation.vector.x - 360.0).abs() < 1e-9);
+}
+
+#[test]
+fn what_was_registered_can_be_located_without_adding_it() {
+    let (walls, truth) = (walls(), drive());
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let mut trajectory = Trajectory::new(0.1);
+    assert_eq!(trajectory.locate(&Pose2::identity(), [0.1; 2], &[]), None);
+    for step in 0..4 {
+        let moved = if step == 0 { Pose2::identity() } else { pose(STEP, 0.0, 0.0) };
+        trajectory.add(&moved, scan(&walls, &truth[step], &mut random));
+    }
+    let at = truth[3] * pose(0.2, 0.05, 0.1);
+    let found = trajectory.locate(&Pose2::identity(), [0.1; 2], &scan(&walls, &at, &mut random)).unwrap();
+    let off = found.inverse() * truth[3].inv_mul(&at);
+    assert!(off.translation.vector.norm() < 0.02 && off.rotation.angle().abs() < 0.01, "{off}");
+    assert_eq!(trajectory.poses().len(), 4);
+}

@@ -1,0 +1,191 @@
+//! The poses of a robot at its scans, as they are known so far.
+
+use super::local_map::LocalMap;
+use super::loop_closure::{LoopClosure, Revisit, find_loop_closures};
+use super::odometry_noise::OdometryNoise;
+use super::pose_graph::{Constraint, PoseGraph, turned_information};
+use super::scan_points::ScanPoint;
+use super::scan_registration::register;
+use crate::shared::geometry::Pose2;
+use nalgebra::{Matrix3, Vector3};
+use std::ops::Range;
+
+/// Number of scans before one that make up its local map, at most, and the path that they may span, metres.
+const RECENT_SCANS: usize = 40;
+const RECENT_PATH: f64 = 20.0;
+/// Path of a submap, metres, and number of its scans, at most.
+const SUBMAP_PATH: f64 = 4.0;
+const SUBMAP_SCANS: usize = 30;
+/// Share of its points that must lie on the local map, for a scan to be registered at all.
+const LEAST_MATCHED: f64 = 0.15;
+/// Distance of an earlier submap from the robot, metres, up to which it is part of the local map once a loop closure
+/// has tied it, and the standard deviations up to which it is tied: metres and radians.
+const REVISITED_DISTANCE: f64 = 10.0;
+const REVISITED_DEVIATIONS: [f64; 2] = [0.15, 0.05];
+
+/// A scan that is a node of the pose graph.
+#[derive(Clone, Debug)]
+pub struct Keyframe {
+    /// Its points, in the frame of the base.
+    pub points: Vec<ScanPoint>,
+    /// Share of the points that lay on the local map when it was registered.
+    pub matched: f64,
+}
+
+/// The scans of a robot with their poses, in the frame of the first.
+#[derive(Clone, Debug)]
+pub struct Trajectory {
+    noise: OdometryNoise,
+    graph: PoseGraph,
+    keyframes: Vec<Keyframe>,
+    /// Path of odometry up to each scan, metres.
+    paths: Vec<f64>,
+    submaps: Vec<Range<usize>>,
+    /// First scan of the submap that is not finished.
+    submap_start: usize,
+    /// Earlier submaps that are part of the local map.
+    revisited: Vec<usize>,
+    closures: Vec<LoopClosure>,
+    unmatched: usize,
+}
+
+impl Trajectory {
+    /// Nothing so far. `odometry_deviation` is the standard deviation of odometry that is assumed before the first scan,
+    /// as a share of the way and the turn.
+    pub fn new(odometry_deviation: f64) -> Self {
+        Self {
+            noise: OdometryNoise::new(odometry_deviation),
+            graph: PoseGraph::default(),
+            keyframes: Vec::new(),
+            paths: Vec::new(),
+            submaps: Vec::new(),
+            submap_start: 0,
+            revisited: Vec::new(),
+            closures: Vec::new(),
+            unmatched: 0,
+        }
+    }
+
+    /// The poses of the base at the scans.
+    pub fn poses(&self) -> &[Pose2] {
+        &self.graph.poses
+    }
+
+    /// The scans.
+    pub fn keyframes(&self) -> &[Keyframe] {
+        &self.keyframes
+    }
+
+    /// The loop closures that were found.
+    pub fn closures(&self) -> &[LoopClosure] {
+        &self.closures
+    }
+
+    /// How many scans lay on no earlier ones, and have their pose by odometry.
+    pub fn unmatched(&self) -> usize {
+        self.unmatched
+    }
+
+    /// Adds a scan of a robot that has moved by `moved` since the last one, by odometry. Returns whether a loop
+    /// closure has moved earlier scans.
+    pub fn add(&mut self, moved: &Pose2, points: Vec<ScanPoint>) -> bool {
+        let Some(last) = self.graph.poses.last().copied() else {
+            self.push(Pose2::identity(), 0.0, Keyframe { points, matched: 1.0 });
+            return false;
+        };
+        let guess = last * moved;
+        let by_odometry = self.noise.information(moved);
+        let prior = turned_information(&by_odometry, &last.rotation);
+        let map = self.local_map();
+        let found = register(&map, &points, &guess, &prior, self.noise.deviations(moved));
+        let is_matched = found.matched >= LEAST_MATCHED;
+        let pose = if is_matched { found.pose } else { guess };
+        self.unmatched += usize::from(!is_matched);
+        let by_walls = if is_matched { found.information } else { Matrix3::zeros() };
+        let by_walls = turned_information(&by_walls, &last.rotation.inverse());
+        let information = by_walls + by_odometry;
+        let to = self.graph.poses.len();
+        let transform = last.inv_mul(&pose);
+        if let (true, Some(covariance)) = (is_matched, information.try_inverse()) {
+            self.noise.learn(moved, &transform, &covariance);
+        }
+        self.graph.constraints.push(Constraint { from: to - 1, to, transform, information, is_loop: false });
+        self.push(pose, moved.translation.vector.norm(), Keyframe { points, matched: found.matched });
+        let is_long = self.paths[to] - self.paths[self.submap_start] > SUBMAP_PATH;
+        (is_long || to - self.submap_start >= SUBMAP_SCANS) && self.finish_submap()
+    }
+
+    /// Registers points on the local map, without adding them: the pose relative to the last scan, `guess` being what it
+    /// is expected to be with these standard deviations of position and yaw. `None` if the points lie on no earlier ones.
+    pub fn locate(&self, guess: &Pose2, deviations: [f64; 2], points: &[ScanPoint]) -> Option<Pose2> {
+        let last = self.graph.poses.last()?;
+        let [place, yaw] = deviations.map(|deviation| deviation.powi(-2));
+        let information = Matrix3::from_diagonal(&Vector3::new(place, place, yaw));
+        let information = turned_information(&information, &last.rotation);
+        let found = register(&self.local_map(), points, &(last * guess), &information, deviations);
+        (found.matched >= LEAST_MATCHED).then(|| last.inv_mul(&found.pose))
+    }
+
+    fn push(&mut self, pose: Pose2, way: f64, keyframe: Keyframe) {
+        self.graph.poses.push(pose);
+        self.paths.push(self.paths.last().map_or(0.0, |path| path + way));
+        self.keyframes.push(keyframe);
+    }
+
+    /// The first of the scans that make up the local map.
+    fn recent(&self) -> usize {
+        let count = self.keyframes.len();
+        let path = self.paths.last().map_or(0.0, |path| path - RECENT_PATH);
+        self.paths.partition_point(|at| *at < path).max(count.saturating_sub(RECENT_SCANS))
+    }
+
+    /// The last scans, and the earlier submaps around the robot.
+    fn local_map(&self) -> LocalMap {
+        let recent = self.recent();
+        let revisited = self.revisited.iter().flat_map(|submap| self.submaps[*submap].clone());
+        let scans = revisited.filter(|scan| *scan < recent).chain(recent..self.keyframes.len());
+        LocalMap::new(scans.map(|scan| (self.graph.poses[scan], &self.keyframes[scan].points[..])))
+    }
+
+    /// Finishes the submap of the last scans, and looks for loop closures. Returns whether one has moved earlier
+    /// scans.
+    pub fn finish_submap(&mut self) -> bool {
+        let own = self.submap_start..self.keyframes.len();
+        if own.is_empty() {
+            return false;
+        }
+        self.submap_start = own.end;
+        self.submaps.push(own);
+        let recent = self.recent();
+        let revisit = Revisit { graph: &self.graph, keyframes: &self.keyframes, submaps: &self.submaps, recent };
+        let found = find_loop_closures(&revisit);
+        self.graph.constraints.extend(found.iter().map(|closure| closure.constraint));
+        let has_moved = !found.is_empty();
+        self.closures.extend(found);
+        if has_moved {
+            self.graph.optimize();
+        }
+        self.revisited = self.tied_submaps(recent);
+        has_moved
+    }
+
+    /// The earlier submaps around the last scan, whose pose relative to it is well known.
+    fn tied_submaps(&self, recent: usize) -> Vec<usize> {
+        let Some(last) = self.graph.poses.len().checked_sub(1).filter(|_| !self.closures.is_empty()) else {
+            return Vec::new();
+        };
+        let covariances = self.graph.covariances_from(last);
+        let here = self.graph.poses[last].translation.vector;
+        let is_tied = |submap: &usize| {
+            let scans = &self.submaps[*submap];
+            let middle = (scans.start + scans.end) / 2;
+            let is_near = (self.graph.poses[middle].translation.vector - here).norm() < REVISITED_DISTANCE;
+            let is_known = covariances[middle].is_some_and(|covariance| {
+                let place = (covariance.m11 + covariance.m22).sqrt();
+                place < REVISITED_DEVIATIONS[0] && covariance.m33.sqrt() < REVISITED_DEVIATIONS[1]
+            });
+            scans.end <= recent && is_near && is_known
+        };
+        (0..self.submaps.len()).filter(is_tied).collect()
+    }
+}
