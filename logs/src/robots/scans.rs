@@ -7,7 +7,7 @@ use gridweave_runtime::ros::{
     DecodeError, Header, LaserEcho, LaserScan, MultiEchoLaserScan, RangeScan, RosMessage, TFMessage, decode,
 };
 use gridweave_runtime::stage::frame_of_robot;
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 
 /// Transforms scans to the base frame, by the mounting poses of lidars.
 #[derive(Debug)]
@@ -30,14 +30,22 @@ impl Scans {
         }
     }
 
-    /// Transforms a scan to the base frame, in the plane. The angles of a lidar mounted upside down run clockwise.
-    pub(crate) fn to_base_frame(&self, robot: &str, scan: LaserScan) -> Result<RangeScan, NoTransform> {
-        let (base, transform_base_lidar) = self.mounts.mount(robot, &scan.header.frame_id)?;
+    /// Whether tf says where the lidar with the frame `frame` is mounted on its robot.
+    pub(crate) fn knows_mount(&self, robot: &str, frame: &str) -> bool {
+        self.mounts.mount(robot, frame).is_ok()
+    }
+
+    /// Transforms a scan to the base frame, in the plane. The angles of a lidar mounted upside down run clockwise. A lidar
+    /// whose [mount is unknown](Self::knows_mount) is taken to be the base.
+    pub(crate) fn to_base_frame(&self, robot: &str, scan: LaserScan) -> RangeScan {
+        let mount = self.mounts.mount(robot, &scan.header.frame_id);
+        let (base, transform_base_lidar) =
+            mount.unwrap_or_else(|NoTransform| (scan.header.frame_id.clone(), Isometry3::identity()));
         let ahead = transform_base_lidar * Vector3::x();
         let is_upright = (transform_base_lidar * Vector3::z()).z >= 0.0;
         let turning = |angle: f32| if is_upright { f64::from(angle) } else { -f64::from(angle) };
         let place = transform_base_lidar.translation;
-        Ok(RangeScan {
+        RangeScan {
             header: Header { stamp: scan.header.stamp, frame_id: base },
             x: place.x,
             y: place.y,
@@ -48,7 +56,7 @@ impl Scans {
             range_min: scan.range_min,
             range_max: scan.range_max,
             ranges: scan.ranges,
-        })
+        }
     }
 }
 
@@ -108,7 +116,7 @@ mod tests {
     #[test]
     fn a_scan_is_seen_from_where_its_lidar_is_mounted() {
         let scans = scans([0.2, -0.1], UnitQuaternion::from_euler_angles(0.0, 0.0, 0.5));
-        let found = scans.to_base_frame("r1", scan("r1/laser")).unwrap();
+        let found = scans.to_base_frame("r1", scan("r1/laser"));
         assert_eq!((found.header.frame_id.as_str(), found.x, found.y), ("r1/base_link", 0.2, -0.1));
         assert!((found.yaw - 0.5).abs() < 1e-9, "{found:?}");
         assert_eq!((found.angle_min, found.angle_increment, found.ranges.len()), (-1.0, 0.5, 2));
@@ -117,16 +125,18 @@ mod tests {
     #[test]
     fn a_lidar_mounted_upside_down_turns_the_other_way() {
         let scans = scans([0.0, 0.0], UnitQuaternion::from_euler_angles(PI, 0.0, 0.0));
-        let found = scans.to_base_frame("r1", scan("r1/laser")).unwrap();
+        let found = scans.to_base_frame("r1", scan("r1/laser"));
         assert!(found.yaw.abs() < 1e-9);
         assert_eq!((found.angle_min, found.angle_increment), (1.0, -0.5));
     }
 
     #[test]
-    fn a_scan_in_the_base_frame_needs_no_mount_and_one_in_an_unknown_frame_is_an_error() {
+    fn a_scan_in_the_base_frame_needs_no_mount_and_a_lidar_in_an_unknown_frame_is_the_base() {
         let scans = Scans::new(None);
-        assert_eq!(scans.to_base_frame("r1", scan("r1/base_footprint")).unwrap().x, 0.0);
-        assert_eq!(scans.to_base_frame("r1", scan("r1/laser")), Err(NoTransform));
+        assert!(scans.knows_mount("r1", "r1/base_footprint") && !scans.knows_mount("r1", "r1/laser"));
+        assert_eq!(scans.to_base_frame("r1", scan("r1/base_footprint")).x, 0.0);
+        let found = scans.to_base_frame("r1", scan("r1/laser"));
+        assert_eq!((found.x, found.y, found.yaw, &*found.header.frame_id), (0.0, 0.0, 0.0, "r1/laser"));
     }
 
     #[test]

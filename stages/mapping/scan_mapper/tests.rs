@@ -84,6 +84,13 @@ fn scan(seconds: f64) -> RangeScan {
     }
 }
 
+/// The ranges of a scan that takes no time.
+fn still_ranges(seconds: f64) -> Vec<f32> {
+    let [x, y, yaw] = LIDAR;
+    let lidar = truth(seconds) * pose(x, y, yaw);
+    (0..BEAMS).map(|beam| cast(&lidar, -3.0 + TAU / BEAMS as f64 * beam as f64) as f32).collect()
+}
+
 struct Bench(StageHarness);
 
 impl Bench {
@@ -301,12 +308,62 @@ fn invalid_messages_are_reported_and_leave_the_rest() {
 }
 
 #[test]
-fn a_robot_without_poses_and_odometry_has_no_map() {
-    let mut bench = Bench::new("");
-    (0..300).for_each(|tick| bench.scan(0.1 * f64::from(tick), &scan(0.0)));
+fn scans_alone_give_a_map_and_poses() {
+    let mut bench = Bench::new("interval = 8");
+    for tick in 0..300 {
+        let seconds = 0.1 * f64::from(tick);
+        // A scan of one moment: without odometry, nothing is known of the motion during a scan.
+        let still = RangeScan { time_increment: 0.0, ranges: still_ranges(seconds), ..scan(seconds) };
+        bench.scan(seconds, &still);
+    }
     let (map, count) = bench.map(30.0);
+    assert_eq!(count, 4, "three on the way, and one at the end");
+    let drawn = measure(&map.unwrap(), &truth(0.0));
+    assert!(drawn.mean < CELL && drawn.greatest < 4.0 * CELL, "{} {}", drawn.mean, drawn.greatest);
+    assert!(drawn.occupied > 500 && drawn.free > 15_000, "{} {}", drawn.occupied, drawn.free);
+    let poses: Vec<PoseWithCovarianceStamped> = bench.0.take("pose").unwrap();
+    assert_eq!(poses.len(), 300);
+    let off = (truth(0.0) * poses[299].pose.pose.planar()).inverse() * truth(29.9);
+    assert!(off.translation.vector.norm() < 0.1 && off.rotation.angle().abs() < 0.05, "{off}");
+}
+
+#[test]
+fn offline_all_poses_and_the_map_come_at_the_end() {
+    let mut bench = Bench::new("mode = 'offline'\ninterval = 1");
+    for tick in 0..200 {
+        let seconds = 0.05 * f64::from(tick);
+        bench.pose("odometry", "robot1/odom", seconds, truth(seconds));
+        if tick % 4 == 0 {
+            bench.scan(seconds, &scan(seconds));
+        }
+    }
+    assert!(bench.0.take_messages("map").is_empty() && bench.0.take_messages("pose").is_empty());
+    let (map, count) = bench.map(10.0);
+    assert_eq!(count, 1);
+    let drawn = measure(&map.unwrap(), &Pose2::identity());
+    assert!(drawn.mean < CELL && drawn.greatest < 4.0 * CELL, "{} {}", drawn.mean, drawn.greatest);
+    let poses: Vec<PoseWithCovarianceStamped> = bench.0.take("pose").unwrap();
+    assert_eq!(poses.len(), 200);
+    for (tick, pose) in poses.iter().enumerate() {
+        let off = pose.pose.pose.planar().inverse() * truth(0.05 * tick as f64);
+        assert!(off.translation.vector.norm() < 0.05 && off.rotation.angle().abs() < 0.03, "{tick}: {off}");
+    }
+}
+
+#[test]
+fn scans_that_lie_on_no_others_give_a_warning_and_no_map() {
+    let mut bench = Bench::new("mode = 'offline'");
+    for tick in 0..80 {
+        let seconds = f64::from(tick);
+        bench.pose("odometry", "robot1/odom", seconds, pose(40.0 * seconds, 0.0, 0.0));
+        bench.scan(seconds, &RangeScan { time_increment: 0.0, ..scan(0.1 * seconds) });
+    }
+    let (map, count) = bench.map(80.0);
     assert!(map.is_none() && count == 0);
-    assert!(bench.0.warnings().keys().any(|warning| warning.contains("there is no pose of it")));
+    assert!(bench.0.take_messages("pose").is_empty());
+    let warnings = bench.0.warnings();
+    let is_lost = |text: &String| text.starts_with("no map of robot1") && text.contains("1.0 s after its first scan");
+    assert!(warnings.keys().any(is_lost), "{warnings:?}");
 }
 
 #[test]

@@ -11,6 +11,9 @@ use std::ops::Range;
 
 /// Distance of two submaps up to which they may have walls in common, metres, beyond what they are uncertain.
 const COMMON_DISTANCE: f64 = 6.0;
+/// Number of earlier submaps, the nearest ones, in which one is searched: the cost of a submap does not grow with the
+/// time that a robot spends at one place.
+const MAX_SEARCHED: usize = 12;
 /// Half the window of the search in standard deviations, and its bounds, metres and radians.
 const WINDOW: f64 = 3.0;
 const LEAST_WINDOW: [f64; 2] = [0.3, 0.1];
@@ -37,8 +40,6 @@ pub struct LoopClosure {
     pub matched: f64,
     /// Mean likelihood of the points at the pose, 0 to 1.
     pub response: f64,
-    /// The same at the best other place.
-    pub second: f64,
 }
 
 /// A submap that has just been finished, which may be where the robot was before.
@@ -55,17 +56,26 @@ pub(super) struct Revisit<'a> {
 pub(super) fn find_loop_closures(revisit: &Revisit<'_>) -> Vec<LoopClosure> {
     let Some((own, earlier)) = revisit.submaps.split_last() else { return Vec::new() };
     let centre = middle(own);
-    let earlier: Vec<usize> = (0..earlier.len()).filter(|other| earlier[*other].end <= revisit.recent).collect();
-    if earlier.is_empty() {
+    let poses = &revisit.graph.poses;
+    let distance =
+        |other: &Range<usize>| (poses[middle(other)].translation.vector - poses[centre].translation.vector).norm();
+    let mut candidates: Vec<(f64, usize)> = (0..earlier.len())
+        .filter(|other| earlier[*other].end <= revisit.recent)
+        .map(|other| (distance(&earlier[other]), other))
+        .collect();
+    if candidates.is_empty() {
         return Vec::new();
     }
+    candidates.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let covariances = revisit.graph.covariances_from(centre);
     let points = revisit.points_of_submap(own);
-    let found = earlier.into_iter().filter_map(|other| {
-        let covariance = covariances[middle(&revisit.submaps[other])]?;
-        revisit.find_in(other, centre, &points, &covariance)
-    });
-    found.collect()
+    let may_be_there = |(distance, other): (f64, usize)| {
+        let covariance = covariances[middle(&earlier[other])]?;
+        let deviation = (covariance.m11 + covariance.m22).sqrt();
+        (distance <= COMMON_DISTANCE + 2.0 * deviation).then_some((other, covariance))
+    };
+    let searched = candidates.into_iter().filter_map(may_be_there).take(MAX_SEARCHED);
+    searched.filter_map(|(other, covariance)| revisit.find_in(other, centre, &points, &covariance)).collect()
 }
 
 /// The scan in the middle of a submap, whose pose is that of the submap.
@@ -100,10 +110,6 @@ impl Revisit<'_> {
         let poses = &self.graph.poses;
         let at = middle(&self.submaps[other]);
         let deviations = [(covariance.m11 + covariance.m22).sqrt(), covariance.m33.sqrt()];
-        let apart = (poses[at].translation.vector - poses[centre].translation.vector).norm();
-        if apart > COMMON_DISTANCE + 2.0 * deviations[0] {
-            return None;
-        }
         // The submaps before and after it, too: the later one need not begin where it did.
         let first = self.submaps[other.saturating_sub(1)].start;
         let after = self.submaps.get(other + 1).filter(|after| after.end <= self.recent);
@@ -125,7 +131,7 @@ impl Revisit<'_> {
         }
         let excluded = Excluded { pose: found.pose, distance: OTHER_PLACE[0], turn: OTHER_PLACE[1] };
         let least = MAX_SECOND * found.response;
-        if let Some(_other) = search(&field, &searched, &prior, GAIN, least, Some(&excluded)) {
+        if search(&field, &searched, &prior, GAIN, least, Some(&excluded)).is_some() {
             return None;
         }
         let constraint = Constraint {
@@ -135,6 +141,6 @@ impl Revisit<'_> {
             information: INFORMATION_SHARE * fit.information,
             is_loop: true,
         };
-        Some(LoopClosure { constraint, matched: fit.matched, response: found.response, second: 0.0 })
+        Some(LoopClosure { constraint, matched: fit.matched, response: found.response })
     }
 }

@@ -19,8 +19,10 @@ const SUBMAP_SCANS: usize = 30;
 /// Share of its points that must lie on the local map, for a scan to be registered at all.
 const LEAST_MATCHED: f64 = 0.15;
 /// Distance of an earlier submap from the robot, metres, up to which it is part of the local map once a loop closure
-/// has tied it, and the standard deviations up to which it is tied: metres and radians.
+/// has tied it; the number of these, the nearest ones; and the standard deviations up to which it is tied, metres and
+/// radians.
 const REVISITED_DISTANCE: f64 = 10.0;
+const REVISITED_SUBMAPS: usize = 6;
 const REVISITED_DEVIATIONS: [f64; 2] = [0.15, 0.05];
 
 /// A scan that is a node of the pose graph.
@@ -176,16 +178,19 @@ impl Trajectory {
         };
         let covariances = self.graph.covariances_from(last);
         let here = self.graph.poses[last].translation.vector;
+        let middle = |submap: &usize| (self.submaps[*submap].start + self.submaps[*submap].end) / 2;
+        let distance = |submap: &usize| (self.graph.poses[middle(submap)].translation.vector - here).norm();
         let is_tied = |submap: &usize| {
-            let scans = &self.submaps[*submap];
-            let middle = (scans.start + scans.end) / 2;
-            let is_near = (self.graph.poses[middle].translation.vector - here).norm() < REVISITED_DISTANCE;
-            let is_known = covariances[middle].is_some_and(|covariance| {
+            let is_near = distance(submap) < REVISITED_DISTANCE;
+            let is_known = covariances[middle(submap)].is_some_and(|covariance| {
                 let place = (covariance.m11 + covariance.m22).sqrt();
                 place < REVISITED_DEVIATIONS[0] && covariance.m33.sqrt() < REVISITED_DEVIATIONS[1]
             });
-            scans.end <= recent && is_near && is_known
+            self.submaps[*submap].end <= recent && is_near && is_known
         };
-        (0..self.submaps.len()).filter(is_tied).collect()
+        let tied = (0..self.submaps.len()).filter(is_tied);
+        let mut nearest: Vec<(f64, usize)> = tied.map(|submap| (distance(&submap), submap)).collect();
+        nearest.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        nearest.into_iter().take(REVISITED_SUBMAPS).map(|(_, submap)| submap).collect()
     }
 }

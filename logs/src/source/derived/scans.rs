@@ -2,7 +2,7 @@
 
 use super::super::RobotMessages;
 use super::super::channel::Route;
-use crate::robots::{NoTransform, RobotChannels, Scans, read_scan};
+use crate::robots::{RobotChannels, Scans, read_scan};
 use crate::tf::is_static;
 use gridweave_runtime::ros::TFMessage;
 use gridweave_runtime::stage::{Output, StageError};
@@ -45,16 +45,14 @@ impl DerivedScans {
             output.warn(format!("messages on `{topic}` could not be read as scans"));
             return Ok(());
         };
-        let frame = scan.header.frame_id.clone();
-        match scans.to_base_frame(&route.robot, scan) {
-            Ok(scan) => output.scans.send(&route.robot, &scan),
-            Err(NoTransform) => {
-                output.warn(format!(
-                    "scans on `{topic}` were dropped: tf has no transform from their frame `{frame}` to the base of {}",
-                    route.robot
-                ));
-                Ok(())
-            }
+        let frame = &scan.header.frame_id;
+        if !scans.knows_mount(&route.robot, frame) {
+            output.warn(format!(
+                "tf has no transform from `{frame}`, the frame of `{topic}`, to the base of {}: the lidar is taken to be at \
+                 the base and to look ahead. If it does not, log its mount on /tf_static",
+                route.robot
+            ));
         }
+        output.scans.send(&route.robot, &scans.to_base_frame(&route.robot, scan))
     }
 }
