@@ -8,7 +8,7 @@ use gridweave_runtime::engine::processes::Launch;
 use std::fs::File;
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Once, OnceLock};
 use tracing::field::{Field, Visit};
 use tracing::span;
 use tracing::{Level, Subscriber};
@@ -134,7 +134,23 @@ impl<S: Subscriber> Layer<S> for WarningLayer {
         let mut text = MessageText(String::new());
         event.record(&mut text);
         (self.0)(event.metadata().target(), &text.0);
+        if let Some(advice) = refused_viewer(event.metadata().target(), &text.0) {
+            ADVISED.call_once(|| eprint_line(advice));
+        }
     }
+}
+
+/// Viewers that were refused try again and again; they are advised once.
+static ADVISED: Once = Once::new();
+
+/// What to do about a viewer that the server of the stage `foxglove_sink` has refused, if a warning is about one. The server
+/// does not tell the viewer why.
+fn refused_viewer(module: &str, text: &str) -> Option<&'static str> {
+    let is_refusal = module.starts_with("foxglove::") && text.ends_with(": handshake failed");
+    is_refusal.then_some(
+        "a viewer was refused: `--view` needs one that speaks the protocol `foxglove.sdk.v1`, which the Foxglove app does since \
+         2025; Lichtblick up to 1.21 and others that only speak the older `foxglove.websocket.v1` can open the written log instead",
+    )
 }
 
 /// The message of an event.
@@ -255,6 +271,14 @@ mod tests {
         };
         assert_eq!(logged(0), [false, true, true]);
         assert_eq!(logged(1), [true, true, true]);
+    }
+
+    #[test]
+    fn a_viewer_that_was_refused_is_told_which_protocol_it_needs() {
+        let text = "Dropping client 127.0.0.1:4000: handshake failed";
+        assert!(refused_viewer("foxglove::websocket::server", text).unwrap().contains("foxglove.sdk.v1"));
+        assert_eq!(refused_viewer("foxglove::websocket::server", "Dropping client: too slow"), None);
+        assert_eq!(refused_viewer("zenoh", text), None);
     }
 
     #[test]

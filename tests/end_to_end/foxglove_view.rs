@@ -3,8 +3,8 @@
 use crate::python_libraries::{python, script};
 use crate::support::{LOG, RECEIVE, Run, gridweave};
 use serde_json::Value;
-use std::io::{BufRead, BufReader};
-use std::net::TcpListener;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use tempfile::TempDir;
@@ -35,6 +35,27 @@ fn a_port_that_the_system_chooses_is_told() {
     let told = done.ended.text();
     let port: String = told.split_once("ws://127.0.0.1:").unwrap().1.chars().take_while(char::is_ascii_digit).collect();
     assert_ne!(port.parse::<u16>().unwrap(), 0, "{told}");
+}
+
+#[test]
+fn a_viewer_of_the_older_protocol_is_refused_and_the_needed_one_is_named() {
+    let port = free_port();
+    let run = Run::start(RECEIVE, &[&format!("--view={port}")]);
+    run.top();
+    // Viewers try again.
+    for _ in 0..2 {
+        let mut viewer = TcpStream::connect(("127.0.0.1", port)).unwrap();
+        let request = "GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
+                       Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\
+                       Sec-WebSocket-Protocol: foxglove.websocket.v1\r\n\r\n";
+        viewer.write_all(request.as_bytes()).unwrap();
+        let mut answer = String::new();
+        viewer.read_to_string(&mut answer).unwrap();
+        assert!(answer.starts_with("HTTP/1.1 400"), "{answer}");
+    }
+    let done = run.interrupt();
+    let told = done.ended.text();
+    assert_eq!(told.matches("`foxglove.sdk.v1`").count(), 1, "{told}");
 }
 
 #[test]

@@ -67,6 +67,23 @@ fn python_libraries_read_every_message() {
 
 #[test]
 #[ignore = "needs python3 with venv, and the network"]
+fn python_libraries_read_every_message_of_a_ros_1_bag() {
+    let folder = TempDir::new().unwrap();
+    let python = python(folder.path());
+    simulate(folder.path(), "in.mcap", &SMALL_BUILDING);
+    gridweave(folder.path(), &["merge", "in.mcap", "-o", "merged.bag"]).assert(0, &["merged 2 of 2"]);
+    gridweave(folder.path(), &["run", "cut", "--input", "in.mcap", "-o", "plain.bag", "--set", "out.compression=none"])
+        .assert(0, &[]);
+    for name in ["merged.bag", "plain.bag"] {
+        let bag = folder.path().join(name);
+        let read = output(&python, &[script("read_ros1.py").as_ref(), bag.as_ref()]);
+        let read: BTreeMap<String, u64> = serde_json::from_str(&read).unwrap();
+        assert_eq!(read, counts(&bag), "{name}");
+    }
+}
+
+#[test]
+#[ignore = "needs python3 with venv, and the network"]
 fn the_package_of_messages_is_one_that_the_python_libraries_of_colcon_take() {
     let folder = TempDir::new().unwrap();
     let python = python(folder.path());

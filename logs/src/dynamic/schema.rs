@@ -100,22 +100,7 @@ impl Schema {
     /// Parses the schema of the type `name` (`package/msg/Type`): its definition and then, each after a line of `=` and
     /// a line `MSG: package/Type`, the definitions of all types that it uses.
     pub fn parse(name: &str, text: &str) -> Result<Self, SchemaError> {
-        let mut sections = BTreeMap::new();
-        let mut section = (short_name(name), String::new());
-        let mut starts = false;
-        for line in text.lines() {
-            if is_separator(line) {
-                starts = true;
-            } else if let Some(name) = line.trim().strip_prefix("MSG:").filter(|_| starts) {
-                let (done, text) = std::mem::replace(&mut section, (short_name(name.trim()), String::new()));
-                sections.entry(done).or_insert(text);
-                starts = false;
-            } else {
-                section.1.push_str(line);
-                section.1.push('\n');
-            }
-        }
-        sections.entry(section.0).or_insert(section.1);
+        let sections = sections(name, text);
         let mut builder = Builder { sections, done: BTreeMap::new(), types: Vec::new() };
         builder.add(&short_name(name), 0)?;
         Ok(Self { types: builder.types })
@@ -133,6 +118,27 @@ impl Schema {
             Element::Message(index) => self.types.get(index).map_or(1, |of| of.least_size),
         }
     }
+}
+
+/// The definitions in the schema of the type `name`, by `package/Type`.
+pub(crate) fn sections(name: &str, text: &str) -> BTreeMap<String, String> {
+    let mut sections = BTreeMap::new();
+    let mut section = (short_name(name), String::new());
+    let mut starts = false;
+    for line in text.lines() {
+        if is_separator(line) {
+            starts = true;
+        } else if let Some(name) = line.trim().strip_prefix("MSG:").filter(|_| starts) {
+            let (done, text) = std::mem::replace(&mut section, (short_name(name.trim()), String::new()));
+            sections.entry(done).or_insert(text);
+            starts = false;
+        } else {
+            section.1.push_str(line);
+            section.1.push('\n');
+        }
+    }
+    sections.entry(section.0).or_insert(section.1);
+    sections
 }
 
 fn is_separator(line: &str) -> bool {

@@ -204,8 +204,9 @@ fn look(inputs: &[Input], rules: &NameRules, robots: &RobotTopics, large: u64) -
         (info.start, info.end) = (Some(first.seconds()), Some(last.seconds()));
         info.duration = last.seconds_since(first);
     }
+    survey.remove_merged_maps();
     let robots = topics.entries.iter().map(|entry| (entry.robot.as_str(), &entry.info));
-    let clocks = clocks::notes(robots);
+    let clocks = clocks::notes(robots.filter(|(robot, _)| survey.is_known(robot)));
     let finished = |Entry { mut info, .. }: Entry| {
         let seconds = info.last - info.first;
         info.rate = (info.messages > 1 && seconds > 0.0).then(|| (info.messages - 1) as f64 / seconds);
@@ -213,7 +214,6 @@ fn look(inputs: &[Input], rules: &NameRules, robots: &RobotTopics, large: u64) -
     };
     info.topics = topics.entries.into_iter().map(finished).collect();
     info.topics.sort_by(|a, b| (&a.topic, &a.type_name).cmp(&(&b.topic, &b.type_name)));
-    survey.remove_merged_maps();
     info.problems = survey.problems(&info);
     info.problems.extend(clocks);
     info.robots = survey.into_robots();

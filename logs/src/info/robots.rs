@@ -237,6 +237,11 @@ impl RobotSurvey {
         }
     }
 
+    /// Whether a robot is one of the log.
+    pub(super) fn is_known(&self, robot: &str) -> bool {
+        self.robots.contains_key(robot)
+    }
+
     /// Problems with reading the logs or merging the maps, in the order in which they should be fixed.
     pub(super) fn problems(&self, info: &LogInfo) -> Vec<String> {
         let mut problems = Vec::new();
@@ -288,7 +293,8 @@ impl RobotSurvey {
         {
             problems.push(format!("there is one robot only, {robot}: merge the log with that of another robot"));
         }
-        let missing_poses = self.inferred.missing();
+        let mut missing_poses = self.inferred.missing();
+        missing_poses.retain(|robot, _| robots.contains_key(robot));
         let lacking = |kind: &str, what: fn(&RobotInfo) -> u64| {
             let lacks = |(name, robot): &(&String, &RobotInfo)| {
                 what(robot) == 0 && !(kind == "pose" && missing_poses.contains_key(name.as_str()))

@@ -76,11 +76,13 @@ fn problems_for_a_merge_are_reported() {
 fn maps_that_cannot_be_used_and_merged_maps_are_reported() {
     let mut log = two_robots();
     let unusable = OccupancyGrid { info: MapMetaData { width: 3, height: 1, ..map_in("").info }, ..map_in("map") };
+    // The clock of the other program is an hour late.
+    let late = OccupancyGrid { header: Header::new(LogTime(3_607_000_000_000), "world"), ..map_in("world") };
     log.add("/robot2/map", OccupancyGrid::NAME, 6_000_000_000, &unusable).add(
         "/map_merge/map",
         OccupancyGrid::NAME,
         7_000_000_000,
-        &map_in("world"),
+        &late,
     );
     let info = inspect_bytes(&log.finish());
     assert_eq!(info.robots.keys().collect::<Vec<_>>(), ["robot1", "robot2"]);
@@ -90,6 +92,8 @@ fn maps_that_cannot_be_used_and_merged_maps_are_reported() {
     ] {
         assert!(info.problems.iter().any(|known| known == problem), "{:?}", info.problems);
     }
+    let of_merged = info.problems.iter().filter(|problem| problem.contains("map_merge"));
+    assert_eq!(of_merged.count(), 1, "nothing else of it is of interest: {:?}", info.problems);
 }
 
 #[test]

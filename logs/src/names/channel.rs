@@ -1,9 +1,12 @@
 //! A channel with its names under a robot.
 
+use super::shared_frames::SharedFrames;
 use crate::dynamic::{Recoder, Schema};
+use crate::tf::tf_topic;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::stage::frame_of_robot;
 use std::borrow::Cow;
+use std::sync::Arc;
 
 /// A channel named so that it is unique among the channels of all robots.
 #[derive(Debug)]
@@ -11,6 +14,8 @@ pub(crate) struct NamedChannel {
     pub(crate) channel: Channel,
     pub(super) is_wanted: bool,
     frames: Frames,
+    /// Frames in the transforms of all robots that are put under one of them.
+    shared: Option<Arc<SharedFrames>>,
 }
 
 /// The treatment of the frames in a channel's messages.
@@ -53,7 +58,18 @@ impl NamedChannel {
                 },
             },
         };
-        Self { channel, is_wanted, frames }
+        Self { channel, is_wanted, frames, shared: None }
+    }
+
+    /// Whether the channel has the transforms of all robots.
+    pub(super) fn is_shared_tf(&self) -> bool {
+        let is_of_a_robot = matches!(&self.frames, Frames::OfRobot { robot, .. } if !robot.is_empty());
+        tf_topic(&self.channel) == Some("") && !is_of_a_robot
+    }
+
+    /// Puts the frames in the transforms of all robots under the robots that they belong to.
+    pub(super) fn share_frames(&mut self, shared: Arc<SharedFrames>) {
+        self.shared = Some(shared);
     }
 
     /// The new name of a frame in the channel's messages.
@@ -72,6 +88,18 @@ impl NamedChannel {
 
     /// Puts the frames of a message under the robot, in a copy if that changes anything.
     pub(crate) fn rename_frames(&self, message: &[u8], copy: &mut Vec<u8>) -> Renamed {
+        let renamed = self.put_under_robot(message, copy);
+        let data = if renamed == Renamed::Copied { copy.as_slice() } else { message };
+        match self.shared.as_ref().and_then(|shared| shared.renamed(data)) {
+            Some(data) => {
+                *copy = data;
+                Renamed::Copied
+            }
+            None => renamed,
+        }
+    }
+
+    fn put_under_robot(&self, message: &[u8], copy: &mut Vec<u8>) -> Renamed {
         let Frames::OfRobot { robot, is_map, later, recoder } = &self.frames else { return Renamed::AsLogged };
         copy.clear();
         let unnamed = if *is_map { "map" } else { "" };

@@ -18,6 +18,7 @@ mod naming;
 mod rename;
 mod rename_advice;
 mod rules;
+mod shared_frames;
 
 #[cfg(test)]
 mod tests;
@@ -36,6 +37,7 @@ use gridweave_runtime::stage::RobotTopics;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// The channels of logs, named under their robots.
 #[derive(Debug)]
@@ -58,8 +60,12 @@ pub fn open(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result
         files.into_iter().map(|file| LogFile::open_as(file, rules.thresholds)).collect::<Result<_, _>>()?;
     clock::align(&mut files, &input_of, rules.align_start);
     let inputs = name_maps(&files, &input_of, inputs)?;
-    let names = naming::name(&files, &input_of, &inputs, rules, robots)?;
-    Ok((LogReader::new(files), names))
+    let mut names = naming::name(&files, &input_of, &inputs, rules, robots)?;
+    let files: Arc<[LogFile]> = files.into();
+    if rules.convention == Convention::ByRobot {
+        names.share_frames(&files, robots);
+    }
+    Ok((LogReader::of(files), names))
 }
 
 /// The inputs, in which map files without a robot are named after their file.

@@ -78,7 +78,7 @@ pub enum ReadError {
         damage: super::Damage,
     },
     /// A folder is not a bag.
-    #[error("{}: the folder has neither metadata.yaml nor an .mcap or .db3 file; give the log file itself", .path.display())]
+    #[error("{}: the folder has neither a metadata.yaml with content nor an .mcap or .db3 file; give the log file itself", .path.display())]
     NotABag {
         /// The folder.
         path: PathBuf,

@@ -84,7 +84,11 @@ impl Ord for Active {
 impl LogReader {
     /// Creates a reader of all messages in `files`.
     pub fn new(files: Vec<LogFile>) -> Self {
-        let files: Arc<[LogFile]> = files.into();
+        Self::of(files.into())
+    }
+
+    /// Creates a reader of all messages in files that others may read, too.
+    pub(crate) fn of(files: Arc<[LogFile]>) -> Self {
         let sizes = files.iter().flat_map(|file| &file.layout.blocks).map(|block| block.size());
         // The sizes are claimed by the files, so they are not trusted.
         let bytes_total = sizes.fold(0, u64::saturating_add);

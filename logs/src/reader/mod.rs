@@ -37,14 +37,14 @@ mod merge;
 mod paths;
 mod prefetch;
 mod record;
-mod ros1;
+pub(crate) mod ros1;
 mod sqlite;
 mod storage;
 mod summary;
 mod supplement;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub use damage::{ChunkFault, Damage};
 pub use error::ReadError;

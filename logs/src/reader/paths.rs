@@ -1,6 +1,7 @@
 //! The log files of an input path: the file itself, or the files of a ROS 2 bag.
 
 use super::error::ReadError;
+use crate::file::folder_of;
 use gridweave_runtime::input_file;
 use serde::Deserialize;
 use std::collections::BTreeSet;
@@ -45,10 +46,14 @@ pub fn log_files(paths: &[PathBuf]) -> Result<Vec<(usize, PathBuf)>, ReadError> 
 
 fn bag_files(folder: &Path) -> Result<Vec<PathBuf>, ReadError> {
     let description = folder.join("metadata.yaml");
-    if description.is_file() {
-        return described_files(&description);
+    match description.is_file() {
+        true => described_files(&description),
+        false => undescribed_files(folder),
     }
-    // A killed recorder leaves no metadata.
+}
+
+/// The log files in a folder without metadata, as a killed recorder leaves it.
+fn undescribed_files(folder: &Path) -> Result<Vec<PathBuf>, ReadError> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|error| ReadError::io(folder, error))? {
         let path = entry.map_err(|error| ReadError::io(folder, error))?.path();
@@ -66,6 +71,10 @@ fn bag_files(folder: &Path) -> Result<Vec<PathBuf>, ReadError> {
 fn described_files(description: &Path) -> Result<Vec<PathBuf>, ReadError> {
     let wrong = |cause: String| ReadError::BagDescription { path: description.to_owned(), cause };
     let text = input_file::read_text(description).map_err(|error| ReadError::io(description, error))?;
+    // A recorder that was killed, or had a full disk, may leave the file empty.
+    if text.trim_matches(|one: char| one.is_whitespace() || one == '\0').is_empty() {
+        return undescribed_files(folder_of(description));
+    }
     let bag: Description = serde_norway::from_str(&text).map_err(|error| wrong(error.to_string()))?;
     let bag = bag.rosbag2_bagfile_information;
     if bag.relative_file_paths.is_empty() {

@@ -1,5 +1,6 @@
 //! Closing a log whose writer was killed.
 
+use super::output_log::{close_bag, is_ros1_bag};
 use super::rewrite::rewrite;
 use super::{LogOptions, LogWriteError, LogWriter, Outcome};
 use crate::file::OutputFile;
@@ -24,12 +25,16 @@ pub enum CloseError {
 
 /// Closes the partial log that a killed writer has left for `path`, and returns its place, as [`LogWriter::finish`]
 /// does; `None` if there is no partial log. The readable part is rewritten, with an index and the `reason` why it is
-/// incomplete. If there is no room for that, the file is closed in place, without an index.
+/// incomplete. If there is no room for that, the file is closed in place, without an index, as a ROS 1 bag always is.
 ///
 /// # Errors
 /// The writer is alive, the partial file is not a log, or it cannot be written.
 pub fn close_log(path: &Path, reason: &str) -> Result<Option<PathBuf>, CloseError> {
     let Some(mut output) = OutputFile::of_killed(path).map_err(LogWriteError::from)? else { return Ok(None) };
+    if is_ros1_bag(path) {
+        let end = LogFile::open(output.part()).ok().and_then(|file| file.damage().iter().find_map(end_of_records));
+        return Ok(Some(close_bag(output, end)?));
+    }
     let (file, end) = match LogFile::open(output.part()) {
         Ok(file) => match file.damage().iter().find_map(end_of_records) {
             Some(end) => (Some(file), Some(end)),

@@ -1,4 +1,5 @@
-//! The stage kind `mcap_sink`: writes all input messages to a log (MCAP, profile `ros2`).
+//! The stage kind `mcap_sink`: writes all input messages to a log (MCAP, profile `ros2`; or, if its name ends in `.bag`, a
+//! ROS 1 bag).
 //!
 //! The log contains the results, each on the topic of its output, and by default the messages of the input on the
 //! channels that they were logged on. The same messages give the same bytes: the log does not contain when or where it
@@ -19,14 +20,17 @@ mod close;
 mod error;
 pub(crate) mod given_frames;
 mod log_writer;
+mod output_log;
 mod provenance;
 mod rewrite;
+mod ros1;
 pub(crate) mod routing;
 mod stage;
 
 pub use close::{CloseError, close_log};
 pub use error::LogWriteError;
 pub use log_writer::{LogOptions, LogWriter, Outcome};
+pub use output_log::is_ros1_bag;
 pub use provenance::InputFile;
 pub(crate) use provenance::{INPUTS_RECORD, RUN_RECORD};
 pub use rewrite::{RecoverError, Recovery, recover, write_supplement};
@@ -55,13 +59,14 @@ pub enum Compression {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SinkParameters {
-    /// The log to write. An existing file of that name is replaced. Set by `--output`.
+    /// The log to write; one whose name ends in `.bag` is a ROS 1 bag. An existing file of that name is replaced. Set by
+    /// `--output`.
     pub file: PathBuf,
     /// Whether the content of the input logs is written beside the results: messages, attachments and metadata records.
     pub pass_input: bool,
     /// The topics to write, in which `{robot}` matches one part of the path: `["/{robot}/map", "/tf"]`. Empty for all.
     pub only_topics: Vec<String>,
-    /// The compression of chunks.
+    /// The compression of chunks; a ROS 1 bag has `lz4` for `zstd`.
     pub compression: Compression,
     /// The size before compression at which a chunk is closed, bytes. If the program is killed, the open chunk is lost.
     #[schemars(range(min = 1 << 10, max = 1 << 29))]
@@ -93,7 +98,7 @@ impl Parameters for SinkParameters {}
 pub fn kind() -> StageKind {
     StageKind::stage(
         "mcap_sink",
-        "Writes messages of any type to a log (MCAP): each result on the topic of its output, and the messages of the \
+        "Writes messages of any type to a log (MCAP, or a ROS 1 bag if its name ends in .bag): each result on the topic of its output, and the messages of the \
          input as they were logged.",
         McapSink::new,
     )

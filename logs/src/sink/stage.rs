@@ -1,9 +1,10 @@
-//! The stage around [`LogWriter`].
+//! The stage around [`OutputLog`].
 
 use super::given_frames::GivenFrames;
+use super::output_log::OutputLog;
 use super::provenance::{INPUTS_RECORD, InputHashes, RUN_RECORD, run_record};
 use super::routing::{ResultTopics, Route, is_tf, result_channel};
-use super::{LogOptions, LogWriteError, LogWriter, Outcome, SinkParameters};
+use super::{LogOptions, LogWriteError, Outcome, SinkParameters};
 use crate::reader::{SupplementKind, read_attachment, read_metadata};
 use gridweave_runtime::message::{Channel, FixedText, Message};
 use gridweave_runtime::ros::{RosMessage, TFMessage};
@@ -13,8 +14,8 @@ use std::collections::BTreeMap;
 /// A channel of the log.
 struct Lane {
     channel: Channel,
-    /// The number in the log, set with the first message.
-    id: Option<u16>,
+    /// The number in the log, set with the first message; or why the log cannot hold its messages.
+    id: Option<Result<u16, String>>,
     /// The sequence number of the next result.
     next_sequence: u32,
 }
@@ -51,7 +52,7 @@ pub(super) struct McapSink {
     inputs: Vec<InputWire>,
     given_frames: GivenFrames,
     /// `None` after the log has ended or failed.
-    log: Option<LogWriter>,
+    log: Option<OutputLog>,
     /// Whether anything was written: a run that fails at the start leaves no log.
     begun: bool,
     /// The pipeline, if it is still to be recorded.
@@ -79,7 +80,7 @@ impl McapSink {
             let doing = format!("write the log of stage `{}`", context.stage);
             return Err(StageError::new(doing, "it has no file").with_help("give --output LOG or file = \"LOG\""));
         }
-        let log = LogWriter::create(&file, LogOptions { compression, chunk_size }).map_err(failure)?;
+        let log = OutputLog::create(&file, LogOptions { compression, chunk_size }).map_err(failure)?;
         Ok(Self {
             pass_input,
             only_topics,
@@ -132,13 +133,21 @@ impl McapSink {
         Ok(lane)
     }
 
-    fn write(&mut self, lane: usize, message: &Message, bytes: &[u8]) -> Result<(), StageError> {
+    fn write(&mut self, lane: usize, message: &Message, bytes: &[u8], output: &Output<()>) -> Result<(), StageError> {
         self.begin()?;
         let log = self.log.as_mut().ok_or_else(closed)?;
         let lane = &mut self.lanes[lane];
-        let channel_id = match lane.id {
+        let id = match &lane.id {
             Some(id) => id,
-            None => *lane.id.insert(log.channel(&lane.channel).map_err(failure)?),
+            None => lane.id.insert(log.channel(&lane.channel).map_err(failure)?),
+        };
+        let left_out = |why: &str| output.warn(format!("messages on {} were left out: {why}", lane.channel.topic));
+        let channel_id = match id {
+            Ok(id) => *id,
+            Err(why) => {
+                left_out(why);
+                return Ok(());
+            }
         };
         let header = message.header();
         let sequence = match header.channel {
@@ -147,7 +156,11 @@ impl McapSink {
         };
         let (log_time, publish_time) = (header.log_time.0, header.publish_time);
         let record = mcap::records::MessageHeader { channel_id, sequence, log_time, publish_time };
-        log.write(&record, bytes).map_err(failure)?;
+        if let Err(why) = log.write(&record, bytes).map_err(failure)? {
+            left_out(&why);
+            return Ok(());
+        }
+        output.count("messages", 1);
         if header.channel == 0 {
             lane.next_sequence = lane.next_sequence.wrapping_add(1);
         }
@@ -165,13 +178,18 @@ impl McapSink {
     }
 
     /// Writes an attachment or metadata record of an input log.
-    fn write_supplement(&mut self, kind: SupplementKind, body: &[u8]) -> Result<(), StageError> {
+    fn write_supplement(&mut self, kind: SupplementKind, body: &[u8], output: &Output<()>) -> Result<(), StageError> {
         self.begin()?;
         let log = self.log.as_mut().ok_or_else(closed)?;
         match kind {
-            SupplementKind::Attachment => {
-                read_attachment(body).map_or(Ok(()), |attachment| log.attachment(&attachment))
-            }
+            SupplementKind::Attachment => match read_attachment(body) {
+                Some(attachment) => log.attachment(&attachment).map(|is_written| {
+                    if !is_written {
+                        output.warn("attachments of the input were left out: a ROS 1 bag has none");
+                    }
+                }),
+                None => Ok(()),
+            },
             SupplementKind::Metadata => match read_metadata(body) {
                 Some((name, metadata)) => match [RUN_RECORD, INPUTS_RECORD].contains(&name.as_str()) {
                     true => log.metadata(&format!("earlier_{name}"), metadata),
@@ -248,7 +266,7 @@ impl McapSink {
                     }
                     *lane
                 }
-                Some(Target::Supplement(kind)) => return self.write_supplement(*kind, message.bytes()),
+                Some(Target::Supplement(kind)) => return self.write_supplement(*kind, message.bytes(), output),
                 Some(Target::Unwanted) => return Ok(()),
                 Some(Target::LeaveOut(reason)) => {
                     output.warn(reason.as_str());
@@ -260,8 +278,7 @@ impl McapSink {
                 }
             },
         };
-        output.count("messages", 1);
-        self.write(lane, message, rest.as_deref().unwrap_or(message.bytes()))
+        self.write(lane, message, rest.as_deref().unwrap_or(message.bytes()), output)
     }
 
     pub(super) fn abort(&mut self, reason: &str) {

@@ -1,4 +1,4 @@
-//! `gridweave convert`: writes logs of any format as one MCAP file.
+//! `gridweave convert`: writes logs of any format as one MCAP file or ROS 1 bag.
 
 use crate::job::{Inputs, Job, Output, ReadingOptions, RunOptions, is_yaml};
 use crate::status::{BadUse, Status};
@@ -18,18 +18,18 @@ pub(crate) struct ConvertArgs {
     /// and frames of a log under the name of its robot.
     #[arg(required = true, value_name = "LOG")]
     pub(crate) inputs: Vec<PathBuf>,
-    /// The output: an MCAP file, or a rosbag2 folder with one: an existing folder, or FOLDER/ with a slash at the end.
+    /// The output: an MCAP file; a rosbag2 folder with one: an existing folder, or FOLDER/ with a slash at the end; or, for
+    /// FILE.bag, a ROS 1 bag.
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) reading: ReadingOptions,
 }
 
-/// Writes logs as one MCAP file.
+/// Writes logs as one.
 pub(crate) fn convert(args: &ConvertArgs, registry: &Registry) -> Result<Status> {
     if Inputs::of_maps_or_logs(&args.inputs, "convert")? == Inputs::MapFiles || is_yaml(&args.output) {
-        let text =
-            "`convert` reads logs and writes an MCAP file; to merge map files: `gridweave merge A.yaml B.yaml -o OUT`";
+        let text = "`convert` reads logs and writes an MCAP file or a ROS 1 bag; to merge map files: `gridweave merge A.yaml B.yaml -o OUT`";
         return Err(BadUse(text.to_owned()).into());
     }
     let options = RunOptions { reading: args.reading.clone(), ..Default::default() };

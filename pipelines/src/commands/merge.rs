@@ -19,8 +19,8 @@ pub(crate) struct MergeArgs {
     /// of its robot. Or map files (map_server YAML), one for each robot; the name of the file is that of the robot.
     #[arg(required = true, value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
-    /// The output: a log (FOLDER/, with a slash at the end, is a rosbag2 folder) or, for FILE.yaml, only the merged map
-    /// (map_server YAML, with the image beside it).
+    /// The output: a log (FOLDER/, with a slash at the end, is a rosbag2 folder, FILE.bag a ROS 1 bag) or, for FILE.yaml, only the
+    /// merged map (map_server YAML, with the image beside it).
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
     #[command(flatten)]

@@ -1,6 +1,6 @@
 //! `gridweave recover`: writes what can be read of a damaged log.
 
-use crate::job::is_input;
+use crate::job::{check_mcap_ending, is_input};
 use crate::status::{BadUse, Status};
 use crate::terminal::print;
 use anyhow::Result;
@@ -25,6 +25,7 @@ pub(crate) struct RecoverArgs {
 /// Writes what can be read of a log.
 pub(crate) fn recover(args: &RecoverArgs) -> Result<Status> {
     let RecoverArgs { input, output } = args;
+    check_mcap_ending(output)?;
     let bag = if Bag::is_meant(output) { Some(Bag::create(output)?) } else { None };
     let file = bag.as_ref().map_or_else(|| output.clone(), Bag::log);
     if is_input(input, &file) {

@@ -6,6 +6,7 @@ use anyhow::{Result, bail};
 use gridweave_logs::file::{check_writable, resolve};
 use gridweave_logs::map_file;
 use gridweave_logs::names::Input;
+use gridweave_logs::sink::is_ros1_bag;
 use gridweave_runtime::pipeline::Pipeline;
 use std::path::{Path, PathBuf};
 
@@ -38,7 +39,7 @@ pub(crate) fn check(pipeline: &Pipeline, options: &RunOptions) -> Result<()> {
     Ok(())
 }
 
-/// Checks that the file of a log, which is written as MCAP, does not have the ending of another format.
+/// Checks that the file of a log, which is written as MCAP or as a ROS 1 bag, does not have the ending of another format.
 ///
 /// # Errors
 ///
@@ -51,10 +52,25 @@ pub(crate) fn check_log_ending(log: &Path) -> Result<()> {
             format!("give --map {}, and a log as merged.mcap", log.with_extension("yaml").display())
         }
         "json" => format!("give --summary {}, and a log as merged.mcap", log.display()),
-        "bag" | "db3" => format!("give {}: rosbag2 and Foxglove read MCAP", log.with_extension("mcap").display()),
+        "db3" => format!("give {}: rosbag2 and Foxglove read MCAP", log.with_extension("mcap").display()),
         _ => return Ok(()),
     };
-    Err(BadUse(format!("a log is written as MCAP, and not as {}: {instead}", log.display())).into())
+    Err(BadUse(format!("a log is written as MCAP or as a ROS 1 bag, and not as {}: {instead}", log.display())).into())
+}
+
+/// Checks the same of a log that is written as MCAP only.
+///
+/// # Errors
+///
+/// It has the ending of another format; the error says how to get that.
+pub(crate) fn check_mcap_ending(log: &Path) -> Result<()> {
+    if is_ros1_bag(log) {
+        let mcap = log.with_extension("mcap");
+        let (mcap, log) = (mcap.display(), log.display());
+        let text = format!("this log is written as MCAP: give {mcap}, and then `gridweave convert {mcap} -o {log}`");
+        return Err(BadUse(text).into());
+    }
+    check_log_ending(log)
 }
 
 /// Lists the logs that a pipeline writes.
@@ -134,14 +150,16 @@ mod tests {
             ("merged.PDF", "--picture merged.PDF"),
             ("merged.pgm", "--map merged.yaml"),
             ("merged.json", "--summary merged.json"),
-            ("merged.bag", "give merged.mcap"),
             ("merged.db3", "give merged.mcap"),
         ] {
             let error = check_log_ending(Path::new(log)).unwrap_err().to_string();
             assert!(error.contains(option), "{error}");
         }
         for log in ["merged.mcap", "merged", "merged.part", ".png", "a.png/merged.mcap"] {
-            assert!(check_log_ending(Path::new(log)).is_ok(), "{log}");
+            assert!(check_mcap_ending(Path::new(log)).is_ok(), "{log}");
         }
+        assert!(check_log_ending(Path::new("merged.bag")).is_ok());
+        let error = check_mcap_ending(Path::new("part.BAG")).unwrap_err().to_string();
+        assert!(error.contains("`gridweave convert part.mcap -o part.BAG`"), "{error}");
     }
 }

@@ -109,6 +109,16 @@ impl OutputPorts {
         self.add(OutputPort { name, port_type: PortType::of::<T>(), topic: None, side: true, summary })
     }
 
+    /// Declares a side output whose messages have the given topic, as [`output_on`](Self::output_on) does.
+    pub fn side_output_on<T: RosMessage>(
+        &mut self,
+        topic: &'static str,
+        name: &'static str,
+        summary: &'static str,
+    ) -> Out<T> {
+        self.add(OutputPort { name, port_type: PortType::of::<T>(), topic: Some(topic), side: true, summary })
+    }
+
     /// Declares an output for messages of any type, each of a channel that was [announced](Out::announce) before.
     pub fn any_output(&mut self, name: &'static str, summary: &'static str) -> Out<AnyMessage> {
         self.encoded_output(PortType::Any, name, summary)

@@ -50,8 +50,8 @@ impl Outputs for Placement {
             tf: ports.output_on(
                 "/tf_static",
                 "tf",
-                "the same poses as static transforms from `world`, once it is certain which robot is the reference; at the \
-                 end also those of robots connected with each other only, from a frame of their own, `world/ROBOT`, with \
+                "the same poses as static transforms from `world`, once it is certain which robot is the reference; before \
+                 that only from `world` to `world_origin`, so that viewers know the frame; at the end also those of robots connected with each other only, from a frame of their own, `world/ROBOT`, with \
                  the name of the robot in whose map frame they are placed. No frame ever changes its parent",
             ),
             verdicts: ports.output_on(
@@ -215,7 +215,8 @@ impl FrameSolver {
         Ok(true)
     }
 
-    /// As long as the reference may change, no transform to the world is certain.
+    /// As long as the reference may change, no transform to the world is certain, and only the world itself is sent: viewers
+    /// show nothing in a frame that no transform names.
     fn send_transforms(
         &mut self,
         frames: &RobotFrames,
@@ -223,10 +224,11 @@ impl FrameSolver {
         output: &Output<Placement>,
     ) -> Result<(), StageError> {
         let is_certain = self.wanted.is_some() || self.is_settled || frames.frames.len() > 1;
-        if !(last || is_certain) {
-            return Ok(());
-        }
-        match self.tree.update(frames, last) {
+        let transforms = match last || is_certain {
+            true => self.tree.update(frames, last),
+            false => self.tree.open(&frames.header),
+        };
+        match transforms {
             Some(transforms) => output.tf.send("", &transforms),
             None => Ok(()),
         }

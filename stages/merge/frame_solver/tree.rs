@@ -16,6 +16,19 @@ pub(super) struct Tree {
 }
 
 impl Tree {
+    /// The first transform, with which the world is known before any robot is in it: from the frame `header` names to a child
+    /// of its own at the same place. None if anything was sent before.
+    pub(super) fn open(&mut self, header: &Header) -> Option<TFMessage> {
+        if !self.sent.is_empty() {
+            return None;
+        }
+        let world = &header.frame_id;
+        let origin = RobotFrame { frame_id: format!("{world}_origin"), ..Default::default() };
+        let transform = transform(header, world, &origin);
+        self.sent.insert(origin.frame_id, (world.clone(), transform.transform));
+        Some(TFMessage { transforms: vec![transform] })
+    }
+
     /// The transforms to send; none if all were sent before. Groups are included in the `last` ones only.
     pub(super) fn update(&mut self, message: &RobotFrames, last: bool) -> Option<TFMessage> {
         let groups = message.groups.iter().filter(|_| last).map(|group| (&group.frame_id, &group.frames));

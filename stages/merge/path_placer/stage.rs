@@ -1,7 +1,7 @@
 //! The path placer as a stage.
 
 use super::Drive;
-use crate::shared::placement::Placement;
+use crate::shared::placement::{Placed, Placement};
 use gridweave_runtime::ros::{Header, MapDeformation, Path, PoseStamped, PoseWithCovarianceStamped, RobotFrames};
 use gridweave_runtime::stage::{
     Context, Out, Output, OutputPorts, Outputs, Parameters, Received, StageError, StageKind,
@@ -32,7 +32,7 @@ pub fn kind() -> StageKind {
     StageKind::stage(
         "path_placer",
         "Transforms each placed robot's path into the merged frame, by its map's deformation and frame. Sent when frames or \
-         deformations change, and at the end if any robot has moved since.",
+         deformations change, and at the end if any robot has moved since; at the end also as poses.",
         |parameters: PathPlacerParameters, _: &Context| Ok(PathPlacer { parameters, ..PathPlacer::default() }),
     )
     .inputs("pose", "the robots' poses in their maps", PathPlacer::receive_pose)
@@ -44,12 +44,21 @@ pub fn kind() -> StageKind {
 
 struct Paths {
     path: Out<Path>,
+    pose: Out<PoseStamped>,
 }
 
 impl Outputs for Paths {
     fn declare(ports: &mut OutputPorts) -> Self {
         let summary = "the path of the robot, in the frame `world`; each pose with its own time";
-        Self { path: ports.output_on("/{robot}/merged_path", "path", summary) }
+        Self {
+            path: ports.output_on("/{robot}/merged_path", "path", summary),
+            pose: ports.side_output_on(
+                "/{robot}/merged_pose",
+                "pose",
+                "the poses of the last path, one by one, each with its own time in the header: for programs that read poses, \
+                 such as evo. Sent at the end, when no frame changes any more",
+            ),
+        }
     }
 }
 
@@ -100,20 +109,78 @@ impl PathPlacer {
     }
 
     fn finish(&mut self, output: &Output<Paths>) -> Result<(), StageError> {
-        if self.has_new_deformations || self.has_new_poses { self.send(output) } else { Ok(()) }
+        if self.has_new_deformations || self.has_new_poses {
+            self.send(output)?;
+        }
+        if output.pose.is_read() { self.send_poses(output) } else { Ok(()) }
     }
 
     fn send(&mut self, output: &Output<Paths>) -> Result<(), StageError> {
         (self.has_new_deformations, self.has_new_poses) = (false, false);
         for (robot, placed) in self.placement.placed() {
             let Some(drive) = self.drives.get(robot) else { continue };
-            let stamped = |(stamp, in_map)| PoseStamped {
-                header: Header { stamp, frame_id: RobotFrames::WORLD.to_owned() },
-                pose: placed.in_world(&in_map).into(),
-            };
             let header = Header::new(output.log_time(), RobotFrames::WORLD);
-            output.path.send(robot, &Path { header, poses: drive.poses().map(stamped).collect() })?;
+            output.path.send(robot, &Path { header, poses: in_world(drive, &placed).collect() })?;
         }
         Ok(())
+    }
+
+    fn send_poses(&self, output: &Output<Paths>) -> Result<(), StageError> {
+        for (robot, placed) in self.placement.placed() {
+            let Some(drive) = self.drives.get(robot) else { continue };
+            in_world(drive, &placed).try_for_each(|pose| output.pose.send(robot, &pose))?;
+        }
+        Ok(())
+    }
+}
+
+/// The poses of a drive in the frame `world`.
+fn in_world(drive: &Drive, placed: &Placed<'_>) -> impl Iterator<Item = PoseStamped> {
+    drive.poses().map(|(stamp, in_map)| PoseStamped {
+        header: Header { stamp, frame_id: RobotFrames::WORLD.to_owned() },
+        pose: placed.in_world(&in_map).into(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::geometry::pose;
+    use gridweave_runtime::message::LogTime;
+    use gridweave_runtime::ros::{RobotFrame, Time};
+    use gridweave_runtime::stage::StageHarness;
+
+    fn frames(x: f64) -> RobotFrames {
+        let frame = RobotFrame { robot: "robot1".into(), x, ..Default::default() };
+        RobotFrames { reference: "robot1".into(), frames: vec![frame], ..Default::default() }
+    }
+
+    #[test]
+    fn poses_are_sent_once_in_the_last_frames_each_with_its_own_time() {
+        let mut stage = StageHarness::new(&kind(), "").unwrap();
+        stage.give::<RobotFrames>("frames", "", LogTime(1), &frames(1.0)).unwrap();
+        for second in 0..4 {
+            let header = Header { stamp: Time { sec: second, nanosec: 7 }, ..Default::default() };
+            let pose = pose(f64::from(second), 0.0, 0.0).into();
+            let stamped = PoseWithCovarianceStamped::from(PoseStamped { header, pose });
+            stage.give::<PoseWithCovarianceStamped>("pose", "robot1", LogTime(2), &stamped).unwrap();
+            stage.give::<PoseWithCovarianceStamped>("pose", "robot2", LogTime(2), &stamped).unwrap();
+        }
+        stage.give::<RobotFrames>("frames", "", LogTime(3), &frames(10.0)).unwrap();
+        assert!(stage.take::<PoseStamped>("pose").unwrap().is_empty(), "the frames may change");
+        stage.finish(LogTime(4)).unwrap();
+        let messages = stage.take_messages("pose");
+        assert!(messages.iter().all(|message| message.header().topic.as_str() == "/robot1/merged_pose"));
+        let poses: Vec<PoseStamped> = messages.iter().map(|message| message.decode().unwrap()).collect();
+        let last = stage.take::<Path>("path").unwrap().pop().unwrap();
+        assert_eq!(poses, last.poses);
+        assert_eq!(poses.len(), 4);
+        for (second, pose) in (0..).zip(&poses) {
+            assert_eq!(
+                (pose.header.frame_id.as_str(), pose.header.stamp.sec, pose.header.stamp.nanosec),
+                ("world", second, 7)
+            );
+            assert!((pose.pose.position.x - f64::from(second) - 10.0).abs() < 1e-9);
+        }
     }
 }

@@ -181,10 +181,12 @@ impl MergePlan {
             return fits.then(|| self.groups.unite(first, second, &best)).flatten();
         }
         if self.has_alike(&found) {
+            let (shift, turn) = found.second_best_change;
             let reason = format!(
-                "on the merged maps of {} robots the map fits at several poses, and the maps do not decide which is right: {}",
+                "on the merged map of {} robots two poses fit, the second {:.0} % as well, {shift:.1} m and {:.0} degrees away",
                 count_a + count_b - 1,
-                found.reason(0)
+                100.0 * found.second_best_share,
+                turn.to_degrees(),
             );
             reports.extend(pairs.first().map(|PairInCommon { pair, .. }| PairReport::of(pair.clone(), Err(reason))));
             return None;

@@ -1,8 +1,10 @@
 //! Localization of the tags of one robot.
 
+use super::far_tags::{self, FarTag};
+use super::tag::{REACH_TOLERANCE, Tag};
 use super::{
-    Bearing, BearingGroups, GridSize, Likelihood, NoPose, PoseTrack, Position, Posterior, Reading, ReadingGroups,
-    Sighting, SightingGroups, TagLocalizerParameters, TagMode, largest_variance, read_out,
+    Bearing, BearingGroups, NoPose, PoseTrack, Position, Reading, ReadingGroups, Sighting, SightingGroups,
+    TagLocalizerParameters, TagMode, largest_variance,
 };
 use crate::shared::geometry::Point2;
 use gridweave_runtime::message::LogTime;
@@ -11,17 +13,15 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::fmt;
 
-/// A range that exceeds the reach by less than this many standard deviations is noise.
-const REACH_TOLERANCE: f64 = 4.0;
 /// A tag that was read less than this many seconds ago is not out of reach: otherwise poses that jump back and forth
 /// would read out all tags at every jump, which takes far longer than the drive.
 const LEAST_ABSENCE: f64 = 1.0;
 /// Least standard deviation of a sighting, metres: a smaller covariance ignores how the camera is mounted.
 const LEAST_SIGHTING_STDDEV: f64 = 0.01;
-/// Largest distance at which a camera sees a tag, metres.
+/// Largest distance at which a camera sees a tag, or a radio reads it, metres.
 const FARTHEST: f64 = 1000.0;
-/// Factor by which the first grid of a tag with bearings only is larger, as its distance is unknown.
-const WIDER: f64 = 4.0;
+/// Tags of long range are located again when there are so many times as many readings, and at the end.
+const MORE_READINGS: f64 = 1.2;
 
 /// Localizes all tags of one robot from its poses and readings.
 #[derive(Clone, Debug)]
@@ -33,6 +33,8 @@ pub struct TagLocalizer {
     pending: BTreeMap<(LogTime, u64), TagReading>,
     /// Number of readings that have waited.
     waited: u64,
+    /// Number of readings of tags of long range when these were last located.
+    far_readings: u32,
 }
 
 /// A reading: its time, its tag, and its measurement.
@@ -55,23 +57,6 @@ enum Measured {
     /// Bearing, radians from straight ahead of the robot, with its standard deviation, relative to the sensor: metres
     /// ahead of the robot, and to its left.
     Bearing { sensor: Vector2<f64>, bearing: f64, stddev: f64 },
-}
-
-/// Readings and estimate of one tag.
-#[derive(Clone, Debug)]
-struct Tag {
-    /// Position of the robot at the first reading: the centre of the grid.
-    first_place: Point2,
-    groups: ReadingGroups,
-    sightings: SightingGroups,
-    bearings: BearingGroups,
-    /// Time, position and distance of the last reading.
-    last: (LogTime, Point2, f64),
-    /// Standard deviation of the most accurate reading, metres.
-    least_stddev: f64,
-    /// Whether there are readings since the last read-out.
-    changed: bool,
-    mode: Option<TagMode>,
 }
 
 /// Why a reading is left out.
@@ -100,7 +85,9 @@ impl fmt::Display for ReadingProblem {
             Self::NoRange => "tag readings with a range that is not positive are left out",
             Self::NoPosition => "tag readings with a position that is not finite are left out",
             Self::NoBearing => "tag readings with a bearing that is not finite are left out",
-            Self::TooFar => "tag readings with a range beyond `reach` are left out",
+            Self::TooFar => {
+                "tag readings with a range beyond `reach`, of tags most of whose ranges are not, are left out"
+            }
             Self::NoPoseBefore => "tag readings before the robot's first pose are left out",
             Self::PoseTooOld => "tag readings more than `max_pose_age` after the last pose are left out",
         })
@@ -110,7 +97,8 @@ impl fmt::Display for ReadingProblem {
 impl TagLocalizer {
     /// A robot without readings.
     pub fn new(parameters: TagLocalizerParameters) -> Self {
-        Self { parameters, track: PoseTrack::default(), tags: BTreeMap::new(), pending: BTreeMap::new(), waited: 0 }
+        let (track, tags, pending) = (PoseTrack::default(), BTreeMap::new(), BTreeMap::new());
+        Self { parameters, track, tags, pending, waited: 0, far_readings: 0 }
     }
 
     /// Adds a pose of the robot, and the readings that waited for it. Returns `false`, and ignores it, if it is older
@@ -131,14 +119,14 @@ impl TagLocalizer {
     pub fn add_reading(&mut self, time: LogTime, tag_id: &str, range: f64, stddev: f64) -> Result<(), ReadingProblem> {
         let TagLocalizerParameters { reach, range_stddev, .. } = self.parameters;
         // `max` returns the other value for NaN.
-        let stddev = range_stddev.max(stddev).min(range_stddev.max(reach));
+        let stddev = range_stddev.max(stddev).min(range_stddev.max(reach).max(range));
         if tag_id.is_empty() {
             return Err(ReadingProblem::NoId);
         }
         if !(range.is_finite() && range > 0.0) {
             return Err(ReadingProblem::NoRange);
         }
-        if range > reach + REACH_TOLERANCE * stddev {
+        if range > FARTHEST {
             return Err(ReadingProblem::TooFar);
         }
         self.place_or_wait(TagReading { time, tag_id: tag_id.to_owned(), measured: Measured::Range(range), stddev })
@@ -232,6 +220,8 @@ impl TagLocalizer {
         let tag = self.tags.entry(tag_id).or_insert_with(|| Tag {
             first_place,
             groups: ReadingGroups::default(),
+            far_groups: None,
+            beyond: 0,
             sightings: SightingGroups::default(),
             bearings: BearingGroups::default(),
             last: (time, position.place, range),
@@ -239,14 +229,27 @@ impl TagLocalizer {
             changed: false,
             mode: None,
         });
-        let min_travel = self.parameters.min_travel;
+        let TagLocalizerParameters { min_travel, reach, .. } = self.parameters;
+        if !matches!(measured, Measured::Bearing { .. }) && tag.readings() == tag.bearings.bearings() && tag.beyond == 0
+        {
+            tag.first_place = first_place;
+        }
         match measured {
-            Measured::Range(range) => tag.groups.add(&Reading { position, range, stddev }, min_travel),
+            Measured::Range(range) => {
+                tag.add_range(&Reading { position, range, stddev }, min_travel, reach);
+            }
             Measured::Place(place) => tag.sightings.add(&Sighting { position, seen: seen(place), stddev }, min_travel),
             Measured::Bearing { sensor, bearing, stddev } => {
                 let position = Position { place: seen(sensor), ..position };
                 tag.bearings.add(&Bearing { position, bearing: position.yaw + bearing, stddev }, min_travel);
             }
+        }
+        if let Measured::Range(range) = measured
+            && range > reach + REACH_TOLERANCE * stddev
+            && !tag.is_far()
+        {
+            // An echo does not show where the tag is.
+            return Ok(());
         }
         tag.last = (time, position.place, range);
         tag.least_stddev = tag.least_stddev.min(stddev);
@@ -261,7 +264,7 @@ impl TagLocalizer {
             return false;
         };
         let TagLocalizerParameters { timeout, reach, .. } = self.parameters;
-        self.read_out_if(|&(last_time, last_place, last_range)| {
+        self.read_out_if(false, |&(last_time, last_place, last_range)| {
             // By the triangle inequality the tag is at least this far away.
             let distance = (place - last_place).norm() - last_range;
             let age = time.seconds_since(last_time);
@@ -271,73 +274,54 @@ impl TagLocalizer {
 
     /// Reads out all tags that have changed since their last read-out. Returns whether there were any.
     pub fn read_out_all(&mut self) -> bool {
-        self.read_out_if(|_| true)
+        self.read_out_if(true, |_| true)
     }
 
-    fn read_out_if(&mut self, due: impl Fn(&(LogTime, Point2, f64)) -> bool) -> bool {
+    fn read_out_if(&mut self, is_end: bool, due: impl Fn(&(LogTime, Point2, f64)) -> bool) -> bool {
         let parameters = &self.parameters;
-        let mut any = false;
+        let (mut any, mut any_far) = (false, false);
         for tag in self.tags.values_mut() {
-            if tag.changed && tag.readings() >= parameters.min_readings && due(&tag.last) {
+            if !(tag.changed && tag.readings() >= parameters.min_readings && due(&tag.last)) {
+                continue;
+            }
+            if tag.is_far() {
+                any_far = true;
+            } else {
                 tag.changed = false;
                 tag.mode = tag.locate(parameters);
                 any = true;
             }
         }
-        any
+        if any_far && self.locate_far(is_end) { true } else { any }
+    }
+
+    /// Locates all tags of long range, unless there are hardly more readings than the last time: all of them are located
+    /// together. Returns whether it did.
+    fn locate_far(&mut self, is_end: bool) -> bool {
+        let parameters = &self.parameters;
+        let far = || self.tags.values().filter(|tag| tag.is_far() && tag.readings() >= parameters.min_readings);
+        let readings = far().map(Tag::readings).fold(0, u32::saturating_add);
+        if !is_end && f64::from(readings) < MORE_READINGS * f64::from(self.far_readings) {
+            return false;
+        }
+        let read: Vec<FarTag> = far().map(|tag| tag.far_tag(parameters)).collect();
+        let mut modes = far_tags::locate(&read, parameters).into_iter();
+        self.far_readings = readings;
+        for tag in self.tags.values_mut().filter(|tag| tag.is_far() && tag.readings() >= parameters.min_readings) {
+            tag.changed = false;
+            tag.mode = modes.next().flatten().map(|mode| tag.with_shared_error(mode, parameters));
+        }
+        true
+    }
+
+    /// Number of ranges from beyond the reach of the tags that they are of.
+    pub fn too_far(&self) -> u32 {
+        self.tags.values().filter(|tag| !tag.is_far()).map(|tag| tag.beyond).fold(0, u32::saturating_add)
     }
 
     /// The tags that have been read out, with the number of their readings, by id.
     pub fn modes(&self) -> impl Iterator<Item = (&str, &TagMode, u32)> {
         self.tags.iter().filter_map(|(id, tag)| Some((id.as_str(), tag.mode.as_ref()?, tag.readings())))
-    }
-}
-
-impl Tag {
-    fn readings(&self) -> u32 {
-        self.groups.readings().saturating_add(self.sightings.sightings()).saturating_add(self.bearings.bearings())
-    }
-
-    fn locate(&self, parameters: &TagLocalizerParameters) -> Option<TagMode> {
-        let TagLocalizerParameters { pose_stddev, heading_stddev, outlier_share, reach, readout, .. } = *parameters;
-        let TagLocalizerParameters { resolution, position_stddev, .. } = *parameters;
-        let rings = self.groups.rings(pose_stddev).chain(self.sightings.rings(pose_stddev, heading_stddev));
-        let rays = self.bearings.rays(pose_stddev, heading_stddev);
-        let likelihood = Likelihood::new(rings, rays, outlier_share, reach);
-        let mut window = parameters.window_cells(self.least_stddev);
-        let mut grid = GridSize { centre: self.first_place, cells: parameters.cells(), resolution };
-        if self.readings() == self.bearings.bearings() {
-            let wide = GridSize { resolution: WIDER * resolution, ..grid };
-            let about = read_out(&Posterior::new(&likelihood, wide)?, readout, window)?.position;
-            let edge = 0.5 * (WIDER - 1.0) * grid.cells as f64 * resolution;
-            // Bearings that cross at the edge or beyond determine no position.
-            if (about - grid.centre).amax() > edge {
-                return None;
-            }
-            grid.centre = about;
-            // From beyond the reach a bearing is less accurate.
-            let nearest = self.bearings.rays(pose_stddev, heading_stddev).map(|ray| (about - ray.origin).norm());
-            let farther = nearest.fold(f64::INFINITY, f64::min) / reach;
-            window = parameters.window_cells(self.least_stddev * farther.max(1.0));
-        }
-        let mut mode = read_out(&Posterior::new(&likelihood, grid)?, readout, window)?;
-        mode.covariance += self.shared_covariance(pose_stddev, heading_stddev);
-        for axis in 0..2 {
-            mode.covariance[(axis, axis)] += position_stddev * position_stddev;
-        }
-        Some(mode)
-    }
-
-    /// Common error of the poses of all readings: the mean over the kinds of readings.
-    fn shared_covariance(&self, pose_stddev: f64, heading_stddev: f64) -> Matrix2<f64> {
-        let ways = [
-            (self.groups.readings(), self.groups.shared_covariance(pose_stddev)),
-            (self.sightings.sightings(), self.sightings.shared_covariance(pose_stddev, heading_stddev)),
-            (self.bearings.bearings(), self.bearings.shared_covariance(heading_stddev)),
-        ];
-        let read = ways.iter().filter(|(readings, _)| *readings > 0);
-        let count = read.clone().count().max(1);
-        read.map(|(_, covariance)| covariance).sum::<Matrix2<f64>>() / count as f64
     }
 }
 

@@ -12,9 +12,12 @@
 //! - [`RingProduct`] is the product of the rings, in logarithms: 300 factors underflow.
 //! - [`Posterior`] is the product on the grid, computed from coarse to fine without negligible cells.
 //! - [`read_out`] finds the window, and the mode around it.
+//! - `far_tags` locates tags that are read from beyond `reach`, together with the calibration of the radio: on no grid of
+//!   fine cells, as that of a large area would be.
 //! - [`PoseTrack`] interpolates the pose of the robot at the time of a reading, with its covariance.
 
 mod bearing_groups;
+mod far_tags;
 mod likelihood;
 mod localizer;
 mod parameters;
@@ -29,6 +32,7 @@ mod sighting_groups;
 mod stage;
 #[cfg(test)]
 mod stage_tests;
+mod tag;
 
 pub use bearing_groups::{Bearing, BearingGroups};
 pub use likelihood::Likelihood;

@@ -37,8 +37,9 @@ pub struct TagLocalizerParameters {
     /// its accuracy. 0 keeps `window` as it is.
     #[schemars(range(min = 0.0))]
     pub window_deviations: f64,
-    /// Largest distance at which a tag is read, metres. Greater readings are left out, and a tag is read out when it
-    /// is out of reach. The paper has 3 m.
+    /// Largest distance at which a tag of short range is read, metres. Greater readings of such a tag are left out, and
+    /// it is read out when it is out of reach. The paper has 3 m. A tag most of whose readings are greater has a radio of
+    /// long range, such as UWB: all its readings count, and its reach is theirs.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub reach: f64,
     /// Least standard deviation of a reading, metres: used where a reading has none, or a smaller one. The paper has
@@ -57,6 +58,13 @@ pub struct TagLocalizerParameters {
     /// distribution over ranges up to `reach`. 0 is the paper's pure Gaussian, which one bad reading can mislead.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub outlier_share: f64,
+    /// Standard deviation of the offset of ranges, metres, which is estimated with the tags of long range: delays that
+    /// are the same for all tags of a robot. 0 for a radio that is calibrated.
+    #[schemars(range(min = 0.0))]
+    pub offset_stddev: f64,
+    /// The same for the scale of ranges: 0.05 is five in a hundred.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub scale_stddev: f64,
     /// Standard deviation of a sighting without a covariance, metres at a distance of up to one metre, and
     /// proportionally more at a greater distance.
     #[schemars(extend("exclusiveMinimum" = 0))]
@@ -95,6 +103,8 @@ impl Default for TagLocalizerParameters {
             pose_stddev: 0.02,
             min_travel: 0.1,
             outlier_share: 0.02,
+            offset_stddev: 1.0,
+            scale_stddev: 0.05,
             sighting_stddev: 0.05,
             bearing_stddev: 0.05,
             heading_stddev: 0.02,
@@ -168,6 +178,8 @@ mod tests {
             pose_stddev: -0.1,
             min_travel: f64::NAN,
             outlier_share: 0.6,
+            offset_stddev: -1.0,
+            scale_stddev: f64::NAN,
             sighting_stddev: 0.0,
             bearing_stddev: -0.1,
             heading_stddev: f64::NAN,
@@ -187,6 +199,8 @@ mod tests {
             "pose_stddev",
             "min_travel",
             "outlier_share",
+            "offset_stddev",
+            "scale_stddev",
             "sighting_stddev",
             "bearing_stddev",
             "heading_stddev",

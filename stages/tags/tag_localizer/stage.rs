@@ -1,6 +1,9 @@
 //! The stage `tag_localizer`.
 
-use super::{CovarianceProblem, Position, TagLocalizer, TagLocalizerParameters, heading_variance, position_covariance};
+use super::{
+    CovarianceProblem, Position, ReadingProblem, TagLocalizer, TagLocalizerParameters, heading_variance,
+    position_covariance,
+};
 use crate::shared::geometry::Point2;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{
@@ -125,6 +128,9 @@ impl TagLocalizerStage {
     fn finish(&mut self, output: &Output<Estimates>) -> Result<(), StageError> {
         for (name, robot) in &mut self.robots {
             robot.localizer.place_pending(|problem| output.warn(problem.to_string()));
+            for _ in 0..robot.localizer.too_far() {
+                output.warn(ReadingProblem::TooFar.to_string());
+            }
             if robot.localizer.read_out_all() || !robot.sent {
                 robot.send(name, output)?;
             }

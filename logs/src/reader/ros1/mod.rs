@@ -15,6 +15,7 @@ mod record;
 mod tests;
 
 pub(crate) use bag::{Bag, BagChunk};
+pub(crate) use record::{BAG, CHUNK, CHUNK_INFO, CONNECTION, INDEX, MESSAGE};
 
 /// The magic bytes of a bag.
 pub(crate) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";

@@ -6,11 +6,12 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// The opcodes of records.
-pub(super) const MESSAGE: u8 = 2;
-pub(super) const BAG: u8 = 3;
-pub(super) const INDEX: u8 = 4;
-pub(super) const CHUNK: u8 = 5;
-pub(super) const CONNECTION: u8 = 7;
+pub(crate) const MESSAGE: u8 = 2;
+pub(crate) const BAG: u8 = 3;
+pub(crate) const INDEX: u8 = 4;
+pub(crate) const CHUNK: u8 = 5;
+pub(crate) const CHUNK_INFO: u8 = 6;
+pub(crate) const CONNECTION: u8 = 7;
 
 /// The maximum length of a header, bytes; actual headers have tens of bytes.
 const LONGEST_HEADER: usize = 1 << 20;

@@ -75,6 +75,13 @@ fn a_bag_folder_is_read_in_the_order_of_its_description() {
         std::fs::write(&description, text).unwrap();
         assert!(error(folder.path()).to_string().contains("is outside of the bag"), "{outside}");
     }
+    for empty in ["", "\n", "\0\0\0"] {
+        std::fs::write(&description, empty).unwrap();
+        for path in [folder.path(), description.clone()] {
+            let seen = read_all(open(&[path]).unwrap()).0;
+            assert_eq!(seen.iter().map(|seen| &seen.3[..]).collect::<Vec<_>>(), [b"0", b"1"], "as without one");
+        }
+    }
     std::fs::write(&description, "hello: [").unwrap();
     assert!(matches!(error(folder.path()), ReadError::BagDescription { .. }));
 }

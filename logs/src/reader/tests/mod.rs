@@ -29,7 +29,7 @@ fn read_all(mut reader: LogReader) -> (Vec<ReadMessage>, Vec<Damage>) {
 type MessageInFile = (String, u64, Vec<u8>);
 
 /// All messages of a file, and all reported damage.
-pub(super) fn read_file(path: &Path) -> Result<(Vec<MessageInFile>, Vec<Damage>), ReadError> {
+pub(crate) fn read_file(path: &Path) -> Result<(Vec<MessageInFile>, Vec<Damage>), ReadError> {
     let (seen, damage) = read_all(LogReader::new(vec![LogFile::open(path)?]));
     Ok((seen.into_iter().map(|(_, topic, time, data)| (topic, time, data)).collect(), damage))
 }

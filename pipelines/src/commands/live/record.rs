@@ -4,6 +4,7 @@ use super::link_choice::{Link, all_links, named_links};
 use super::running::{RunChoice, Running, find_run};
 use super::tap::LOOK_INTERVAL;
 use crate::interrupt::stop_on_interrupt;
+use crate::job::check_mcap_ending;
 use crate::status::Status;
 use crate::terminal::print_line;
 use anyhow::{Result, bail};
@@ -39,6 +40,7 @@ const FLUSH_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Records links until the run ends or the user interrupts it.
 pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
+    check_mcap_ending(&args.output)?;
     check_writable(&args.output)?;
     let running = find_run(&args.run, registry)?;
     let mut links = Vec::new();

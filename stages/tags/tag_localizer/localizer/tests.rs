@@ -230,3 +230,70 @@ fn an_invalid_standard_deviation_is_replaced() {
     let mode = localizer.modes().next().unwrap().1;
     assert!(mode.position.coords.iter().chain(mode.covariance.iter()).all(|value| value.is_finite()), "{mode:?}");
 }
+
+#[test]
+fn a_first_bearing_from_beyond_the_reach_does_not_set_where_the_tag_is_searched() {
+    let mut random = ChaCha8Rng::seed_from_u64(17);
+    let noise = Normal::new(0.0, 0.05).unwrap();
+    let mut localizer = TagLocalizer::new(TagLocalizerParameters::default());
+    let tag = Point2::new(20.0, 1.5);
+    for step in 0..200 {
+        let (time, place) = (at(0.1 * f64::from(step)), Point2::new(0.12 * f64::from(step), 0.0));
+        localizer.add_pose(time, Position::new(place), |problem| panic!("{problem}"));
+        let offset = tag - place;
+        let bearing = offset.y.atan2(offset.x) + noise.sample(&mut random);
+        localizer.add_bearing(time, "tag", Vector2::zeros(), bearing, 0.05).unwrap();
+        if offset.norm() < 3.0 {
+            localizer.add_reading(time, "tag", offset.norm() + noise.sample(&mut random), 0.05).unwrap();
+        }
+    }
+    localizer.read_out_all();
+    let (_, mode, _) = localizer.modes().next().unwrap();
+    assert!((mode.position - tag).norm() < 0.15 && mode.certainty > 0.75, "{mode:?}");
+}
+
+#[test]
+fn tags_most_of_whose_ranges_are_beyond_the_reach_are_of_long_range() {
+    let noise = Normal::new(0.0, 0.1).unwrap();
+    let tags = [Point2::new(-10.0, 4.0), Point2::new(15.0, 9.0)];
+    for echo in [false, true] {
+        let mut random = ChaCha8Rng::seed_from_u64(19);
+        let mut localizer = TagLocalizer::new(TagLocalizerParameters::default());
+        for step in 0..240 {
+            let (time, angle) = (at(0.1 * f64::from(step)), 0.03 * f64::from(step));
+            let place = Point2::new(6.0 * angle.cos(), 6.0 * angle.sin());
+            localizer.add_pose(time, Position::new(place), |problem| panic!("{problem}"));
+            for (tag, id) in tags.iter().zip(["a", "b"]) {
+                let wrong = if echo && step % 10 == 3 { 40.0 } else { 0.0 };
+                let range = (tag - place).norm() + noise.sample(&mut random) + wrong;
+                localizer.add_reading(time, id, range, 0.1).unwrap();
+            }
+        }
+        localizer.read_out_all();
+        assert_eq!((localizer.modes().count(), localizer.too_far()), (2, 0));
+        for ((_, mode, readings), tag) in localizer.modes().zip(tags) {
+            assert!((mode.position - tag).norm() < 0.4 && mode.certainty > 0.9, "{mode:?}");
+            assert_eq!(readings, 240);
+        }
+    }
+}
+
+#[test]
+fn echoes_from_beyond_the_reach_are_counted_and_change_nothing() {
+    let estimate = |echoes: bool| {
+        let mut localizer = TagLocalizer::new(TagLocalizerParameters::default());
+        for (step, (x, y)) in corner().enumerate() {
+            let time = at(0.1 * step as f64);
+            localizer.add_pose(time, position(x, y), |problem| panic!("{problem}"));
+            if echoes && step % 20 == 10 {
+                localizer.add_reading(time, "tag", 25.0, 0.05).unwrap();
+            }
+            localizer.add_reading(time, "tag", (TAG - Point2::new(x, y)).norm(), 0.05).unwrap();
+        }
+        localizer.read_out_all();
+        (*localizer.modes().next().unwrap().1, localizer.too_far())
+    };
+    let ((without, none), (with, some)) = (estimate(false), estimate(true));
+    assert_eq!((without, none), (with, 0));
+    assert!(some > 5, "{some}");
+}
