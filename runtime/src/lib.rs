@@ -17,3 +17,4 @@ pub mod program;
 pub mod robot_colour;
 pub mod ros;
 pub mod stage;
+pub mod terminal_text;
