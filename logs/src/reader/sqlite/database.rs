@@ -28,6 +28,8 @@ pub(crate) struct Database {
     /// The ids of rows with incomplete messages, ascending.
     torn: Vec<i64>,
 }
+    /// The name of the number of a row of `messages`.
+    row_number: &'static str,
 
 impl Database {
     /// Opens the database at `path` and determines its layout. A compressed one was decompressed to `decompressed`.
@@ -42,13 +44,16 @@ impl Database {
         let torn = if cut.is_some() { torn_rows(&connection, &file) } else { Vec::new() };
         layout.damage.extend(cut);
         layout.damage.extend(beside(path));
-        let topics = tables::read_topics(&connection, &mut layout)?;
-        let channels = topics.into_iter().collect();
-        survey(&connection, &mut layout).map_err(text_of)?;
+        let channels = tables::read_topics(&connection, &mut layout, file.len())?;
+        let messages = tables::table(&connection, "messages").map_err(text_of)?;
+        let row_number = messages.and_then(|table| table.row_number());
+        let row_number =
+            row_number.ok_or("the rows of its table `messages` have no number, so it is not a rosbag2 bag")?;
+        survey(&connection, row_number, &torn, file.len() as u64, &mut layout).map_err(text_of)?;
         if layout.blocks.is_empty() && !layout.damage.is_empty() && layout.definitions.channel_count() == 0 {
             return Err("it has no readable topic".to_owned());
         }
-        Ok((Self { file, connection: Mutex::new(connection), channels, torn }, layout))
+        Ok((Self { file, connection: Mutex::new(connection), channels, torn, row_number }, layout))
     }
 
     pub(crate) fn is_cut(&self) -> bool {
@@ -62,7 +67,7 @@ impl Database {
     pub(crate) fn contents(&self, rows: &Rows) -> Result<(Vec<u8>, u64), ChunkFault> {
         // A panicking thread leaves the connection usable.
         let connection = self.connection.lock().unwrap_or_else(PoisonError::into_inner);
-        rows.contents(&connection, &self.torn, &self.channels)
+        rows.contents(&connection, self.row_number, &self.torn, &self.channels)
     }
 }
 
