@@ -20,6 +20,7 @@ pub mod source;
 pub mod summary;
 pub mod tf;
 pub mod truth;
+mod temporary;
 
 #[cfg(test)]
 mod test_log;

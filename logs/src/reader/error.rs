@@ -46,7 +46,7 @@ pub enum ReadError {
         fix: &'static str,
     },
     /// A compressed file cannot be decompressed.
-    #[error("{}: cannot decompress it: {cause}; the folder for temporary files (TMPDIR) needs room for the whole file", .path.display())]
+    #[error("{}: cannot decompress it: {cause}", .path.display())]
     Decompress {
         /// The file.
         path: PathBuf,

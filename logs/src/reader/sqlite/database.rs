@@ -6,6 +6,7 @@ use super::torn::Pages;
 use crate::reader::bytes::FileBytes;
 use crate::reader::damage::{ChunkFault, Damage};
 use crate::reader::layout::Layout;
+use crate::temporary::Name;
 use rusqlite::{Connection, OpenFlags};
 use std::collections::BTreeMap;
 use std::fs;
@@ -32,13 +33,15 @@ pub(crate) struct Database {
     row_number: &'static str,
 
 impl Database {
-    /// Opens the database at `path` and determines its layout. A compressed one was decompressed to `decompressed`.
+    /// Opens the database at `path` and determines its layout. A compressed one was decompressed to `decompressed`, whose name
+    /// is removed.
     ///
     /// # Errors
     /// The cause, if no message can be read.
-    pub(crate) fn open(path: &Path, decompressed: Option<&Path>, file: FileBytes) -> Result<(Self, Layout), String> {
+    pub(crate) fn open(path: &Path, decompressed: Option<Name>, file: FileBytes) -> Result<(Self, Layout), String> {
         let text_of = |error: rusqlite::Error| error.to_string();
-        let connection = connect(decompressed.unwrap_or(path)).map_err(text_of)?;
+        let connection = connect(decompressed.as_ref().map_or(path, Name::path)).map_err(text_of)?;
+        drop(decompressed);
         let mut layout = Layout::default();
         let cut = cut(&file);
         let torn = if cut.is_some() { torn_rows(&connection, &file) } else { Vec::new() };
