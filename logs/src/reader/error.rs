@@ -69,6 +69,14 @@ pub enum ReadError {
         /// The cause.
         cause: String,
     },
+    /// A database has its messages only in a journal that its recorder did not merge.
+    #[error("{}: the recorder did not close the database, and its messages are in {}; `sqlite3 FILE 'pragma wal_checkpoint'` on a copy of both merges them", .path.display(), .journal.display())]
+    OnlyJournal {
+        /// The file.
+        path: PathBuf,
+        /// The journal.
+        journal: PathBuf,
+    },
     /// The file starts like a log, and is truncated or damaged before its first whole message.
     #[error("{}: damaged before the first whole message ({damage}); use another copy", .path.display())]
     NothingLeft {

@@ -67,7 +67,10 @@ impl LogFile {
         };
         let loss = layout.damage.iter().find(|damage| !matches!(damage, Damage::Incomplete { .. }));
         match loss {
-            Some(damage) if layout.blocks.is_empty() => Err(ReadError::NothingLeft { path, damage: damage.clone() }),
+            Some(damage) if layout.blocks.is_empty() => Err(match sqlite::write_ahead_log(&path) {
+                Some(journal) if matches!(storage, Storage::Sqlite(_)) => ReadError::OnlyJournal { path, journal },
+                _ => ReadError::NothingLeft { path, damage: damage.clone() },
+            }),
             _ => Ok(Self { path, size, is_compressed, is_map, later: 0, storage, layout }),
         }
     }
@@ -191,7 +194,10 @@ fn open_storage(path: &Path, bytes: FileBytes, is_decompressed: bool) -> Result<
     let path = || path.to_owned();
     let head = head(&bytes);
     if head.is_empty() {
-        return Err(ReadError::Empty { path: path() });
+        return Err(match sqlite::write_ahead_log(&path()) {
+            Some(journal) => ReadError::OnlyJournal { path: path(), journal },
+            None => ReadError::Empty { path: path() },
+        });
     }
     if head.starts_with(MAGIC) {
         let layout = Layout::of(&bytes);

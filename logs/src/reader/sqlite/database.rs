@@ -28,9 +28,9 @@ pub(crate) struct Database {
     channels: BTreeMap<i64, u16>,
     /// The ids of rows with incomplete messages, ascending.
     torn: Vec<i64>,
-}
     /// The name of the number of a row of `messages`.
     row_number: &'static str,
+}
 
 impl Database {
     /// Opens the database at `path` and determines its layout. A compressed one was decompressed to `decompressed`, whose name
@@ -117,11 +117,18 @@ fn cut(file: &FileBytes) -> Option<Damage> {
 
 /// The damage if a killed recorder has left a journal beside the database, which is not read.
 fn beside(path: &Path) -> Option<Damage> {
-    ["-wal", "-journal"].iter().find_map(|ending| {
-        let mut name = path.as_os_str().to_owned();
-        name.push(ending);
-        let rest = PathBuf::from(name);
-        let is_rest = fs::metadata(&rest).is_ok_and(|file| file.len() > 0);
-        is_rest.then(|| Damage::NotClosed { rest: rest.display().to_string() })
-    })
+    let rest = ["-wal", "-journal"].iter().find_map(|ending| journal(path, ending))?;
+    Some(Damage::NotClosed { rest: rest.display().to_string() })
+}
+
+/// The journal of changes beside a database, if there is one.
+pub(crate) fn write_ahead_log(path: &Path) -> Option<PathBuf> {
+    journal(path, "-wal")
+}
+
+fn journal(path: &Path, ending: &str) -> Option<PathBuf> {
+    let mut name = path.as_os_str().to_owned();
+    name.push(ending);
+    let journal = PathBuf::from(name);
+    fs::metadata(&journal).is_ok_and(|file| file.len() > 0).then_some(journal)
 }

@@ -264,6 +264,27 @@ fn the_journal_of_a_killed_recorder_is_reported() {
 }
 
 #[test]
+fn a_database_with_all_messages_in_its_journal_is_reported_as_that() {
+    let folder = Folder::new();
+    let path = folder.path().join("a.db3");
+    let recorder = Connection::open(&path).unwrap();
+    recorder.execute_batch(&format!("PRAGMA journal_mode = WAL; PRAGMA wal_autocheckpoint = 0; {TABLES}")).unwrap();
+    // As a killed recorder leaves both: a database without tables, and one without bytes.
+    let journal = fs::read(folder.path().join("a.db3-wal")).unwrap();
+    for (name, database) in [("early.db3", fs::read(&path).unwrap()), ("empty.db3", Vec::new())] {
+        let copy = folder.write(name, &database);
+        folder.write(&format!("{name}-wal"), &journal);
+        let error = read_file(&copy).unwrap_err();
+        assert!(matches!(&error, ReadError::OnlyJournal { journal, .. } if journal.ends_with(format!("{name}-wal"))));
+        assert!(error.to_string().contains("wal_checkpoint"), "{error}");
+    }
+    // Tables, and no message.
+    let path = bag(&folder, "tables.db3", &[]);
+    folder.write("tables.db3-wal", &journal);
+    assert!(matches!(read_file(&path), Err(ReadError::OnlyJournal { .. })));
+}
+
+#[test]
 fn compressed_files_and_messages_are_decompressed() {
     let folder = Folder::new();
     let pack = |bytes: &[u8]| zstd::bulk::compress(bytes, 1).unwrap();
