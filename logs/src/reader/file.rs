@@ -49,7 +49,7 @@ impl LogFile {
         let size = file.len() as u64;
         let is_compressed = head(&file).starts_with(ZSTD_MAGIC);
         let is_map = map::is_called_so(&path);
-        let (storage, layout) = match is_compressed {
+        let (storage, mut layout) = match is_compressed {
             false if is_map => {
                 let log =
                     map::as_log(&path, thresholds).map_err(|cause| ReadError::Map { path: path.clone(), cause })?;
@@ -65,6 +65,8 @@ impl LogFile {
                 (storage, layout)
             }
         };
+        let removed = layout.definitions.limit();
+        layout.damage.extend((removed > 0).then_some(Damage::ManyDefinitions { count: removed }));
         let loss = layout.damage.iter().find(|damage| !matches!(damage, Damage::Incomplete { .. }));
         match loss {
             Some(damage) if layout.blocks.is_empty() => Err(match sqlite::write_ahead_log(&path) {
