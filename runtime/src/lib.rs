@@ -11,6 +11,7 @@ pub mod covariance_ellipse;
 pub mod engine;
 pub mod input_file;
 pub mod link;
+pub mod memory;
 pub mod message;
 pub mod pipeline;
 pub mod program;
