@@ -20,7 +20,7 @@ pub mod source;
 pub mod summary;
 pub mod tf;
 pub mod truth;
-mod temporary;
+mod yaml;
 
 #[cfg(test)]
 mod test_log;

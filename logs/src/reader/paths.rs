@@ -1,6 +1,7 @@
 //! The log files of an input path: the file itself, or the files of a ROS 2 bag.
 
 use super::error::ReadError;
+use crate::yaml;
 use gridweave_runtime::input_file;
 use serde::Deserialize;
 use std::collections::BTreeSet;
@@ -66,7 +67,7 @@ fn bag_files(folder: &Path) -> Result<Vec<PathBuf>, ReadError> {
 fn described_files(description: &Path) -> Result<Vec<PathBuf>, ReadError> {
     let wrong = |cause: String| ReadError::BagDescription { path: description.to_owned(), cause };
     let text = input_file::read_text(description).map_err(|error| ReadError::io(description, error))?;
-    let bag: Description = serde_norway::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+    let bag: Description = yaml::parse(&text).map_err(wrong)?;
     let bag = bag.rosbag2_bagfile_information;
     if bag.relative_file_paths.is_empty() {
         return Err(wrong("it lists no files".into()));
