@@ -11,6 +11,7 @@ pub mod info;
 pub mod map_file;
 pub mod names;
 pub mod picture;
+mod os_error;
 pub mod qos;
 pub mod reader;
 mod robots;

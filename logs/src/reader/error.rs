@@ -22,7 +22,7 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// Another error of the operating system.
-    #[error("{}: {cause}", .path.display())]
+    #[error("{}: {}", .path.display(), crate::os_error::of_reading(.cause))]
     Io {
         /// The path.
         path: PathBuf,
