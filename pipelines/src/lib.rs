@@ -25,6 +25,7 @@ pub mod shipped;
 mod status;
 pub mod summary;
 pub mod table;
+mod temporary;
 mod terminal;
 mod text_wrapping;
 
