@@ -2,6 +2,7 @@
 //! of nav2's map server, pictures of maps, and summaries of merges.
 
 pub mod bag;
+pub mod browsers;
 pub mod drawing;
 pub mod dynamic;
 pub mod file;
