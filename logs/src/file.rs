@@ -4,6 +4,7 @@
 //! the writer dies. So a locked part belongs to a running writer, and no other program touches it; an unlocked part was
 //! left by a killed writer.
 
+use crate::os_error;
 use rustix::fs::{Access, OFlags, access};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, ErrorKind, Write};
@@ -28,7 +29,7 @@ pub enum WriteError {
         path: PathBuf,
     },
     /// The file system fails.
-    #[error("cannot write {}: {error}; check that its folder exists, is writable and has room", path.display())]
+    #[error("cannot write {}: {}", path.display(), os_error::of_writing(error))]
     Io {
         /// The file.
         path: PathBuf,
@@ -156,7 +157,10 @@ impl OutputFile {
     pub(crate) fn put_in_place(mut self) -> Result<File, WriteError> {
         let put = || {
             if !is_at(&self.file, &self.part) {
-                let text = format!("another program has removed or replaced {} meanwhile", self.part.display());
+                let text = format!(
+                    "another program has removed or replaced {} meanwhile, and what was written to it; run it again",
+                    self.part.display()
+                );
                 return Err(io::Error::other(text));
             }
             if self.place.exists() {

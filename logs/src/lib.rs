@@ -2,6 +2,7 @@
 //! of nav2's map server, pictures of maps, and summaries of merges.
 
 pub mod bag;
+pub mod browsers;
 pub mod drawing;
 pub mod dynamic;
 pub mod file;
@@ -10,6 +11,7 @@ pub mod foxglove;
 pub mod info;
 pub mod map_file;
 pub mod names;
+mod os_error;
 pub mod picture;
 pub mod qos;
 pub mod reader;
@@ -18,8 +20,10 @@ pub mod schemas;
 pub mod sink;
 pub mod source;
 pub mod summary;
+mod temporary;
 pub mod tf;
 pub mod truth;
+mod yaml;
 
 #[cfg(test)]
 mod test_log;

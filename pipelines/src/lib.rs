@@ -25,6 +25,7 @@ pub mod shipped;
 mod status;
 pub mod summary;
 pub mod table;
+mod temporary;
 mod terminal;
 mod text_wrapping;
 
@@ -52,7 +53,7 @@ pub fn command_with(kinds: impl IntoIterator<Item = StageKind>, on_warning: fn(&
         Ok(Status::NotAllMerged) => ExitCode::from(3),
         Err(error) => {
             match error.downcast_ref::<PipelineErrors>() {
-                Some(errors) => terminal::eprint_line(errors.render(std::io::stderr().is_terminal())),
+                Some(errors) => terminal::eprint_styled_line(errors.render(std::io::stderr().is_terminal())),
                 None => terminal::eprint_line(format_args!("error: {error:#}")),
             }
             ExitCode::from(if error.is::<BadUse>() || error.is::<PipelineErrors>() { 2 } else { 1 })

@@ -31,7 +31,8 @@ fn wrapped(line: &str, indent: usize, width: Option<usize>) -> Vec<String> {
     let lines = wrap_words(line, width.saturating_sub(first_indent.max(indent)));
     let indented = |(number, text): (usize, String)| {
         let indent = if number == 0 { first_indent } else { indent };
-        format!("{:indent$}{text}", "")
+        // A width of the format panics beyond 65535.
+        " ".repeat(indent) + &text
     };
     lines.into_iter().enumerate().map(indented).collect()
 }
@@ -44,6 +45,12 @@ mod tests {
     fn a_long_line_is_wrapped_with_a_hanging_indent() {
         assert_eq!(wrap("  one two three", 4, Some(11)), "  one two\n    three");
         assert_eq!(wrap("  one two three", 4, None), "  one two three");
+    }
+
+    #[test]
+    fn an_indentation_of_any_width_is_kept() {
+        let line = " ".repeat(70_000) + "one two";
+        assert!(wrap(&line, 2, Some(40)).starts_with(&(" ".repeat(70_000) + "o")));
     }
 
     #[test]

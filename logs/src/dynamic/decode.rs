@@ -8,6 +8,10 @@ use super::value::{Array, Scalar, Value};
 /// The maximum number of bytes after the last field: encoders pad the length.
 const PADDING: usize = 3;
 
+/// The maximum number of values in a decoded message. A value takes up to a hundred bytes, and a few packed bytes of a log can
+/// expand to a message of a gigabyte.
+const MOST_VALUES: usize = 1 << 21;
+
 /// The error when a message cannot be decoded.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
@@ -55,6 +59,7 @@ impl Schema {
     /// Decodes a message. Strings and byte arrays are borrowed from it, and field names from the schema.
     pub fn decode<'a>(&'a self, bytes: &'a [u8]) -> Result<Value<'a>, DecodeError> {
         let mut reader = CdrReader::new(bytes).ok_or(DecodeError::Encapsulation)?;
+        reader.limit_values(MOST_VALUES);
         let Some(root) = self.root() else { return Ok(Value::Message(Vec::new())) };
         let value = self
             .message(root, &mut reader)
@@ -77,6 +82,7 @@ impl Schema {
     }
 
     fn field<'a>(&'a self, field: &'a Field, reader: &mut CdrReader<'a>) -> Result<Value<'a>, Fault> {
+        reader.count_values(1)?;
         let count = match field.count {
             Count::One => return self.one(field.of, reader),
             Count::Fixed(count) => count,
@@ -116,6 +122,7 @@ impl Schema {
             Element::Primitive(primitive) => primitive,
             Element::Message(index) => {
                 let of = &self.types[index];
+                reader.count_values(count)?;
                 let element = |at| self.message(of, reader).map_err(|fault| fault.within(format!("[{at}]")));
                 return Ok(Array::Messages((0..count).map(element).collect::<Result<_, _>>()?));
             }
@@ -133,6 +140,7 @@ impl Schema {
             Primitive::F32 => Array::F32(reader.numbers(count)?),
             Primitive::F64 => Array::F64(reader.numbers(count)?),
             Primitive::Text => {
+                reader.count_values(count)?;
                 let element = |at| reader.text().map_err(|fault| Fault::from(fault).within(format!("[{at}]")));
                 Array::Text((0..count).map(element).collect::<Result<_, _>>()?)
             }

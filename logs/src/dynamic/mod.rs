@@ -3,7 +3,7 @@
 //! A [`Schema`] is parsed from a channel's schema text (`ros2msg`); it decodes a message (CDR) to a [`Value`]: a tree
 //! of fields with their names, in order. Values can be compared ([`compare`]), queried by field path ([`FieldPath`]),
 //! and converted to JSON ([`Value::to_json`]). Bytes that do not match the schema give an error that names the field;
-//! nothing is allocated beyond the length of the message.
+//! a message has only so many values for its length, and at most two million of them, so little is allocated for it.
 //!
 //! The CDR reader is not a library's, because types are known only from the definition in the log, without a ROS
 //! installation; because decoded values borrow from the message; and because it must be safe on damaged bytes.

@@ -9,6 +9,12 @@ pub enum DecodeFault {
     /// It claims more elements than the rest of the message can contain.
     #[error("the message is too short for {0} elements")]
     Count(usize),
+    /// It and the fields before it have more values than a message of this length is expected to have.
+    #[error("the message has more than {0} values, the maximum for its length")]
+    Values(usize),
+    /// Its conversion is longer than a message can be.
+    #[error("the message takes more than {0} bytes in CDR, the maximum")]
+    Long(usize),
     /// A boolean is neither 0 nor 1.
     #[error("the boolean is {0}")]
     Boolean(u8),
@@ -20,6 +26,11 @@ pub enum DecodeFault {
     WideText,
 }
 
+/// The maximum number of values in a message: so many for each of its bytes, and so many more. Fields without elements
+/// take no bytes, so the length of a message alone does not limit their number.
+const VALUES_A_BYTE: usize = 8;
+const VALUES_ANYWAY: usize = 256;
+
 /// Reads the fields of a message in order.
 pub(super) struct CdrReader<'a> {
     /// The bytes after the encapsulation header; alignment is relative to their start.
@@ -28,6 +39,9 @@ pub(super) struct CdrReader<'a> {
     big_endian: bool,
     /// Whether there is no alignment, as in ROS 1.
     unaligned: bool,
+    /// The maximum number of values, and how many of them were not read yet.
+    most_values: usize,
+    values_left: usize,
 }
 
 /// A number of fixed size.
@@ -61,12 +75,29 @@ impl<'a> CdrReader<'a> {
             [0, 1, ..] => false,
             _ => return None,
         };
-        Some(Self { body, at: 0, big_endian, unaligned: false })
+        Some(Self::of(body, big_endian, false))
     }
 
     /// Reads a message in ROS 1 encoding: little-endian, without alignment and without zero bytes after strings.
     pub(super) fn ros1(body: &'a [u8]) -> Self {
-        Self { body, at: 0, big_endian: false, unaligned: true }
+        Self::of(body, false, true)
+    }
+
+    fn of(body: &'a [u8], big_endian: bool, unaligned: bool) -> Self {
+        let most_values = body.len().saturating_mul(VALUES_A_BYTE).saturating_add(VALUES_ANYWAY);
+        Self { body, at: 0, big_endian, unaligned, most_values, values_left: most_values }
+    }
+
+    /// Reads at most so many values, however long the message is.
+    pub(super) fn limit_values(&mut self, most: usize) {
+        self.most_values = self.most_values.min(most);
+        self.values_left = self.values_left.min(most);
+    }
+
+    /// Counts values that are about to be read: fields, and elements that are messages or strings.
+    pub(super) fn count_values(&mut self, count: usize) -> Result<(), DecodeFault> {
+        self.values_left = self.values_left.checked_sub(count).ok_or(DecodeFault::Values(self.most_values))?;
+        Ok(())
     }
 
     /// Whether numbers are big-endian.

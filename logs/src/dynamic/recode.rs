@@ -15,6 +15,8 @@ const HEADER: &str = "std_msgs/Header";
 const SEQ_SIZE: usize = 4;
 const TIME: &str = "builtin_interfaces/Time";
 const SECOND: u64 = 1_000_000_000;
+/// The maximum length of a converted message, bytes. A ROS 1 message without fields takes no bytes, and one in CDR.
+const LONGEST: usize = 1 << 30;
 
 /// Copies messages of one type, field by field.
 #[derive(Clone, Debug)]
@@ -119,6 +121,9 @@ impl Walk<'_> {
         if reader.is_ros1() && of.name == HEADER {
             reader.bytes(SEQ_SIZE).map_err(own)?;
         }
+        if writer.length() > LONGEST {
+            return Err(own(DecodeFault::Long(LONGEST)));
+        }
         if of.fields.is_empty() {
             // A message without fields is one byte in CDR, and nothing in ROS 1.
             if !reader.is_ros1() {
@@ -131,6 +136,7 @@ impl Walk<'_> {
 
     fn field(&mut self, field: &Field, reader: &mut CdrReader<'_>, writer: &mut Writer<'_>) -> Result<(), Fault> {
         let own = |fault| (field.name.clone(), fault);
+        reader.count_values(1).map_err(own)?;
         let count = match field.count {
             Count::One => 1,
             Count::Fixed(count) => count,
@@ -151,6 +157,9 @@ impl Walk<'_> {
                 let of = schema.types.get(index).ok_or_else(|| own(DecodeFault::End))?;
                 if self.later != 0 && field.name == "stamp" && of.name == TIME && field.count == Count::One {
                     return self.stamp(reader, writer).map_err(own);
+                }
+                if field.count != Count::One {
+                    reader.count_values(count).map_err(own)?;
                 }
                 (0..count).try_for_each(|_| self.message(of, reader, writer))
             }
@@ -207,6 +216,11 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
+    /// The number of bytes of the fields so far.
+    fn length(&self) -> usize {
+        self.bytes.as_ref().map_or(0, |copy| copy.len() - self.body)
+    }
+
     fn put(&mut self, bytes: &[u8]) {
         if let Some(copy) = &mut self.bytes {
             copy.extend_from_slice(bytes);

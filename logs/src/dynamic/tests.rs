@@ -266,6 +266,48 @@ fn a_claimed_length_allocates_nothing_that_is_not_there() {
     }
 }
 
+/// A definition of which a message of `fields` times `fields` values takes one byte for each `fields` of them, or none.
+fn fields_without_bytes(fields: usize) -> String {
+    let names = |of: &str| (0..fields).map(|number| format!("{of} f{number}\n")).collect::<String>();
+    format!("uint32 length\nb/B[] first\n===\nMSG: b/B\n{}", names("int8[0]"))
+}
+
+#[test]
+fn fields_without_bytes_are_limited_by_the_length_of_the_message() {
+    let elements =
+        |count: u32, rest: usize| [&[0, 1, 0, 0][..], &[0; 4], &count.to_le_bytes(), &vec![0; rest]].concat();
+    let schema = Schema::parse("a/A", &fields_without_bytes(1000)).unwrap();
+    let is_refused = |bytes: &[u8]| match schema.decode(bytes) {
+        Err(DecodeError::Field { fault: DecodeFault::Values(most), .. }) => most <= 8 * bytes.len() + 256,
+        _ => false,
+    };
+    assert!(is_refused(&elements(10_000, 10_000)) && is_refused(&elements(8, 8)));
+    // However long the message is.
+    let flat = Schema::parse("a/A", "b/B[] x\n===\nMSG: b/B\nint8 y").unwrap();
+    let long = |count: u32| [&[0, 1, 0, 0][..], &count.to_le_bytes(), &vec![0; count as usize]].concat();
+    assert!(flat.decode(&long(10_000)).is_ok());
+    let error = flat.decode(&long(2_000_000)).unwrap_err();
+    assert!(matches!(error, DecodeError::Field { fault: DecodeFault::Values(2_097_152), .. }), "{error}");
+    // A few of them are read.
+    let few = Schema::parse("a/A", &fields_without_bytes(3)).unwrap();
+    assert!(few.decode(&elements(3, 3)).is_ok());
+}
+
+#[test]
+fn a_converted_message_is_limited_by_the_length_of_the_message() {
+    let fields: String = (0..500).map(|number| format!("std_msgs/Empty[] f{number}\n")).collect();
+    let recoder = Recoder::new(Schema::parse("a/A", &format!("{fields}===\nMSG: std_msgs/Empty\n")).unwrap()).unwrap();
+    // In ROS 1, the elements take no bytes, so each field could have as many as there are bytes.
+    let message = 1000_u32.to_le_bytes().repeat(500);
+    let mut copy = Vec::new();
+    let error = recoder.append_ros1(&message, &mut copy).unwrap_err();
+    assert!(matches!(error, DecodeError::Field { fault: DecodeFault::Values(_), .. }), "{error}");
+    assert!(copy.is_empty());
+    let few = [2_u32.to_le_bytes().repeat(500), vec![0; 8]].concat();
+    recoder.append_ros1(&few, &mut copy).unwrap();
+    assert!(copy.len() > 2 * 500 && copy.len() < 8 * message.len(), "{}", copy.len());
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(512))]
 

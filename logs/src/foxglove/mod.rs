@@ -7,9 +7,12 @@
 //! each client that subscribes to it; for `/tf_static`, the latest transform of each frame. For a slow client, the
 //! oldest messages in its queue are dropped; the run never waits for a client.
 //!
+//! At most 32 clients are let in, and no pages of foreign sites.
+//!
 //! The progress of the stages is published on the topic `/gridweave/stages`, once a second, as JSON with a schema; not
 //! with the engine `single`, which does not count during the run.
 
+mod front;
 mod retained;
 mod stage;
 mod statistics;
@@ -36,11 +39,13 @@ struct FoxgloveParameters {
     /// The maximum number of queued messages per client; beyond it the oldest are dropped.
     #[schemars(range(min = 1, max = 100_000))]
     backlog: usize,
+    /// The sites whose pages may connect, such as `https://viewer.example`, beside those of this machine and of Foxglove.
+    origins: Vec<String>,
 }
 
 impl Default for FoxgloveParameters {
     fn default() -> Self {
-        Self { host: STANDARD_HOST.to_owned(), port: STANDARD_PORT, backlog: 256 }
+        Self { host: STANDARD_HOST.to_owned(), port: STANDARD_PORT, backlog: 256, origins: Vec::new() }
     }
 }
 

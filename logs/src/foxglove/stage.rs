@@ -1,8 +1,9 @@
 //! The stage around the Foxglove server.
 
-use super::FoxgloveParameters;
 use super::retained::RetainedMessages;
 use super::statistics::Statistics;
+use super::{FoxgloveParameters, front};
+use crate::browsers::BrowserServer;
 use crate::qos::is_transient_local;
 use crate::reader::SupplementKind;
 use crate::sink::given_frames::GivenFrames;
@@ -12,6 +13,7 @@ use foxglove::{ChannelBuilder, FoxgloveError, RawChannel, Schema, WebSocketServe
 use gridweave_runtime::message::{Channel, FixedText, Message};
 use gridweave_runtime::stage::{Context, InputWire, Output, StageError};
 use std::collections::BTreeMap;
+use std::io;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -24,7 +26,8 @@ struct Shown {
 
 /// Sends messages to Foxglove.
 pub(super) struct FoxgloveSink {
-    /// `None` after the end.
+    /// Where clients connect; `None` after the end, as the server is.
+    front: Option<BrowserServer>,
     server: Option<WebSocketServerHandle>,
     /// The served channels, which are closed on drop.
     context: Arc<foxglove::Context>,
@@ -42,18 +45,22 @@ pub(super) struct FoxgloveSink {
 
 impl FoxgloveSink {
     pub(super) fn new(parameters: FoxgloveParameters, context: &Context) -> Result<Self, StageError> {
-        let FoxgloveParameters { host, port, backlog } = parameters;
+        let FoxgloveParameters { host, port, backlog, origins } = parameters;
         let (channels, retained) = (foxglove::Context::new(), RetainedMessages::default());
+        let failed = |error: io::Error| cannot_serve(&host, port, &FoxgloveError::Bind(error));
+        let inner = front::random_address().map_err(failed)?;
         let server = WebSocketServer::new()
             .name("gridweave")
             .context(&channels)
             .listener(Arc::new(retained.clone()))
             .message_backlog_size(backlog)
-            .bind(host.as_str(), port)
+            .bind(inner.to_string(), 0)
             .start_blocking()
             .map_err(|error| cannot_serve(&host, port, &error))?;
-        tracing::info!("serving Foxglove on ws://{host}:{}", server.port());
+        let front = front::start(&host, port, (inner, server.port()).into(), origins).map_err(failed)?;
+        tracing::info!("serving Foxglove on ws://{host}:{}", front.address().port());
         Ok(Self {
+            front: Some(front),
             server: Some(server),
             statistics: Statistics::start(context.statistics.clone(), &channels, retained.clone()),
             context: channels,
@@ -134,6 +141,7 @@ impl FoxgloveSink {
     /// Closes all connections.
     pub(super) fn close(&mut self) {
         self.statistics.end();
+        self.front = None;
         if let Some(server) = self.server.take() {
             // Does not wait for clients: one that does not read could block the end of the run.
             drop(server.stop());

@@ -2,6 +2,7 @@
 
 use super::reading::Reading;
 use super::{MapFileError, Mode};
+use crate::yaml;
 use serde::{Deserialize, Deserializer};
 use serde_norway::Value;
 use std::path::{Path, PathBuf};
@@ -50,8 +51,8 @@ impl Description {
     pub(super) fn parse(text: &str, path: &Path) -> Result<Self, MapFileError> {
         // Editors of Windows write a byte order mark.
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let fields: Fields = serde_norway::from_str(text)
-            .map_err(|error| MapFileError::Yaml { path: path.to_owned(), message: error.to_string() })?;
+        let fields: Fields =
+            yaml::parse(text).map_err(|message| MapFileError::Yaml { path: path.to_owned(), message })?;
         let wrong = |field, problem: String| MapFileError::Field { path: path.to_owned(), field, problem };
 
         let Fields { image, resolution: Number(metres), origin, .. } = fields;

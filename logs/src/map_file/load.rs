@@ -10,7 +10,7 @@ use nalgebra::{Isometry2, Vector2};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The maximum size of an image file, bytes: the size of the pixels of the largest image.
+/// The maximum size of an image file, bytes.
 const LARGEST_IMAGE: u64 = 512 << 20;
 /// The extensions of images that are looked for beside a YAML file with the same name.
 const IMAGE_ENDINGS: [&str; 6] = ["pgm", "png", "bmp", "jpg", "jpeg", "ppm"];
@@ -32,14 +32,11 @@ pub fn load(yaml: &Path) -> Result<GridMap, MapFileError> {
 pub fn load_as(yaml: &Path, thresholds: Thresholds) -> Result<(GridMap, Option<MapFileWarning>), MapFileError> {
     let (description, missing) = describe(yaml)?;
     let Description { image: path, resolution, origin: [x, y, yaw], reading } = description;
+    let wrong = |message: String| MapFileError::Image { path: path.clone(), yaml: yaml.to_owned(), message };
     let shades = input_file::read(&path, LARGEST_IMAGE)
         .map_err(image::ImageError::from)
         .and_then(|bytes| Shades::decode(&bytes))
-        .map_err(|error| MapFileError::Image {
-            path: path.clone(),
-            yaml: yaml.to_owned(),
-            message: error.to_string(),
-        })?;
+        .map_err(|error| wrong(error.to_string()))?;
     let (width, height) = shades.size();
     let origin = Pose::from(Isometry2::new(Vector2::new(x, y), yaw));
     let info = MapMetaData { resolution, width, height, origin, ..Default::default() };
@@ -47,8 +44,9 @@ pub fn load_as(yaml: &Path, thresholds: Thresholds) -> Result<(GridMap, Option<M
         Thresholds::Literal => (reading, MapFileWarning::default()),
         Thresholds::ByPicture => reading.by_picture(&shades),
     };
-    let warning = MapFileWarning { image: missing.map(|missing| (missing, path)), ..warning };
-    let cells = shades.cells(|samples, white| reading.pixel(samples, white));
+    let cells =
+        shades.cells(|samples, white| reading.pixel(samples, white)).map_err(|error| wrong(error.to_string()))?;
+    let warning = MapFileWarning { image: missing.map(|missing| (missing, path.clone())), ..warning };
     Ok((GridMap { info, cells }, warning.if_any()))
 }
 

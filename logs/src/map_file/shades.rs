@@ -1,6 +1,7 @@
 //! The image of a map: its conversion from shades to cells, as in nav2's map server.
 
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult};
+use gridweave_runtime::memory;
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult, Limits};
 use std::io::{self, Cursor};
 
 /// The maximum number of image bytes per file byte: eight pixels in a PBM.
@@ -12,8 +13,15 @@ const DENSEST_PNG: u64 = 8 * 1032;
 const DENSEST_JPEG: u64 = 1024;
 /// The same for a BMP: a run of 255 pixels of three colours in two bytes.
 const DENSEST_BMP: u64 = 384;
-/// The maximum size of an image, bytes.
-const LARGEST: u64 = 512 << 20;
+/// The maximum number of pixels of an image: 800 m by 800 m in cells of 0.05 m.
+const MOST_PIXELS: u64 = 1 << 28;
+/// The maximum size of what a decoder keeps beside the pixels, such as texts and the colour profile, bytes.
+const LARGEST_PROFILE: u64 = 16 << 20;
+/// The number of bytes for a pixel beside the image: its cell, and that in the encoded map.
+const BYTES_BESIDE: u64 = 2;
+/// The image of a larger map must have a known cell among so many, pixels.
+const SPARSE_PIXELS: u64 = 1 << 24;
+const SPAREST_KNOWN: u64 = 10_000;
 
 /// An image, and the value of white in it.
 pub(super) struct Shades {
@@ -25,7 +33,10 @@ pub(super) struct Shades {
 impl Shades {
     /// Decodes an image file: PGM, PPM, PBM, PNG, BMP or JPEG, recognised by its first bytes.
     pub(super) fn decode(bytes: &[u8]) -> ImageResult<Self> {
-        let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+        let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+        let mut limits = Limits::no_limits();
+        limits.max_alloc = Some(LARGEST_PROFILE);
+        reader.limits(limits);
         let format = reader.format();
         let densest = match format {
             Some(ImageFormat::Png) => DENSEST_PNG,
@@ -34,11 +45,28 @@ impl Shades {
             _ => DENSEST_PNM,
         };
         let decoder = reader.into_decoder()?;
+        let (width, height) = decoder.dimensions();
+        let pixels = u64::from(width) * u64::from(height);
+        let refuse = |text: String| Err(io::Error::new(io::ErrorKind::InvalidData, text).into());
         // The size is claimed by the file, so it is not trusted.
-        if decoder.total_bytes() > densest.saturating_mul(bytes.len() as u64).min(LARGEST) {
-            let (width, height) = decoder.dimensions();
-            let text = format!("its {} bytes cannot hold the {width} x {height} pixels that it claims", bytes.len());
-            return Err(io::Error::new(io::ErrorKind::InvalidData, text).into());
+        if decoder.total_bytes() > densest.saturating_mul(bytes.len() as u64) {
+            return refuse(format!(
+                "its {} bytes cannot hold the {width} x {height} pixels that it claims",
+                bytes.len()
+            ));
+        }
+        if pixels > MOST_PIXELS {
+            return refuse(format!(
+                "it has {width} x {height} pixels, more than the maximum of {MOST_PIXELS}; crop it"
+            ));
+        }
+        let needed = decoder.total_bytes() + BYTES_BESIDE * pixels;
+        if let Some(available) = memory::available().filter(|available| needed > *available) {
+            return refuse(format!(
+                "its {width} x {height} pixels take {} MB of memory, and {} MB are left; crop it",
+                needed >> 20,
+                available >> 20
+            ));
         }
         let image = DynamicImage::from_decoder(decoder)?;
         let bytes_a_channel = image.color().bytes_per_pixel() / image.color().channel_count();
@@ -87,30 +115,50 @@ impl Shades {
 
     /// The cells, row by row from the image's last row to its first. `cell` converts a pixel's samples, each from 0 to
     /// `white`.
-    pub(super) fn cells(&self, cell: impl Fn(&[f64], f64) -> i8) -> Vec<i8> {
+    ///
+    /// # Errors
+    /// The image is large, and nearly all of it is unknown.
+    pub(super) fn cells(&self, cell: impl Fn(&[f64], f64) -> i8) -> io::Result<Vec<i8>> {
+        let (width, height) = self.size();
+        let pixels = u64::from(width) * u64::from(height);
+        if pixels > SPARSE_PIXELS {
+            let mut known = 0_u64;
+            self.for_each_cell(&cell, |cell| known += u64::from(cell >= 0));
+            if known < pixels / SPAREST_KNOWN {
+                let text = format!("only {known} of its {width} x {height} pixels are known; crop it to these");
+                return Err(io::Error::new(io::ErrorKind::InvalidData, text));
+            }
+        }
+        let mut cells = Vec::with_capacity(usize::try_from(pixels).unwrap_or(0));
+        self.for_each_cell(&cell, |cell| cells.push(cell));
+        Ok(cells)
+    }
+
+    /// Passes the cells to `take`, in their order in the map.
+    fn for_each_cell(&self, cell: &impl Fn(&[f64], f64) -> i8, take: impl FnMut(i8)) {
         let white = self.white;
         let channels = usize::from(self.image.color().channel_count());
         match &self.image {
             // For most maps: 256 shades, each of which is converted once.
             DynamicImage::ImageLuma8(grey) => {
                 let table: Vec<i8> = (0..=255u8).map(|value| cell(&[f64::from(value)], white)).collect();
-                self.rows_upward(grey.as_raw(), 1, |pixel| table[usize::from(pixel[0])])
+                self.rows_upward(grey.as_raw(), 1, |pixel| table[usize::from(pixel[0])], take)
             }
             image => match image.as_flat_samples_u8() {
-                Some(flat) => self.rows_upward(flat.samples, channels, |pixel| of_samples(pixel, white, &cell)),
+                Some(flat) => self.rows_upward(flat.samples, channels, |pixel| of_samples(pixel, white, cell), take),
                 None => {
                     let flat = image.as_flat_samples_u16();
                     let samples = flat.as_ref().map(|flat| flat.samples).unwrap_or_default();
-                    self.rows_upward(samples, channels, |pixel| of_samples(pixel, white, &cell))
+                    self.rows_upward(samples, channels, |pixel| of_samples(pixel, white, cell), take)
                 }
             },
         }
     }
 
-    fn rows_upward<T: Copy>(&self, samples: &[T], channels: usize, cell: impl Fn(&[T]) -> i8) -> Vec<i8> {
+    fn rows_upward<T>(&self, samples: &[T], channels: usize, cell: impl Fn(&[T]) -> i8, take: impl FnMut(i8)) {
         let row = (self.image.width() as usize * channels).max(1);
         let rows = samples.chunks_exact(row).rev();
-        rows.flat_map(|row| row.chunks_exact(channels.max(1))).map(cell).collect()
+        rows.flat_map(|row| row.chunks_exact(channels.max(1))).map(cell).for_each(take);
     }
 }
 

@@ -229,6 +229,59 @@ fn an_image_that_claims_more_than_its_bytes_can_hold_is_an_error() {
     }
 }
 
+/// A PNG image with a colour profile of so many zeros, and none if that is 0.
+fn png(width: u32, height: u32, grey: u8, profile: usize) -> Vec<u8> {
+    let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();
+    let mut chunk = |kind: &[u8; 4], data: &[u8]| {
+        bytes.extend((data.len() as u32).to_be_bytes());
+        let body = [kind.as_slice(), data].concat();
+        bytes.extend(&body);
+        bytes.extend(crc32fast::hash(&body).to_be_bytes());
+    };
+    let packed = |length: usize, byte: u8| {
+        let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+        std::io::copy(&mut std::io::Read::take(std::io::repeat(byte), length as u64), &mut encoder).unwrap();
+        encoder.finish().unwrap()
+    };
+    chunk(b"IHDR", &[&width.to_be_bytes()[..], &height.to_be_bytes(), &[8, 0, 0, 0, 0]].concat());
+    if profile > 0 {
+        chunk(b"iCCP", &[b"p\0\0", &packed(profile, 0)[..]].concat());
+    }
+    // Rows of a filter byte and pixels; of one byte repeated, the filter 1 (the difference to the pixel before).
+    let row = [&[1][..], &[grey], &vec![0; width as usize - 1]].concat();
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+    (0..height).for_each(|_| std::io::Write::write_all(&mut encoder, &row).unwrap());
+    chunk(b"IDAT", &encoder.finish().unwrap());
+    chunk(b"IEND", &[]);
+    bytes
+}
+
+#[test]
+fn an_image_is_limited_by_its_pixels_by_those_that_are_known_and_by_its_profile() {
+    let (folder, path) = folder(&yaml("").replace("map.pgm", "map.png"));
+    let read = |bytes: &[u8]| {
+        fs::write(folder.path().join("map.png"), bytes).unwrap();
+        load(&path)
+    };
+    // A profile that is too large is left out.
+    for profile in [0, 1 << 20, 20 << 20] {
+        assert!(read(&png(30, 20, 254, profile)).unwrap().cells.iter().all(|cell| *cell == 0));
+    }
+    let error = |bytes: &[u8]| read(bytes).unwrap_err().to_string();
+    // Decided before decoding: the pixels are not there.
+    let mut claimed = png(100, 40_000, 254, 0);
+    claimed[16..20].copy_from_slice(&30_000_u32.to_be_bytes());
+    claimed[20..24].copy_from_slice(&30_000_u32.to_be_bytes());
+    let checksum = crc32fast::hash(&claimed[12..29]);
+    claimed[29..33].copy_from_slice(&checksum.to_be_bytes());
+    claimed.extend(vec![0; 200_000]);
+    let text = error(&claimed);
+    assert!(text.contains("30000 x 30000 pixels, more than the maximum"), "{text}");
+    let text = error(&png(5000, 4000, 150, 0));
+    assert!(text.contains("only 0 of its 5000 x 4000 pixels are known"), "{text}");
+    assert_eq!(read(&png(5000, 4000, 254, 0)).unwrap().cells.len(), 20_000_000);
+}
+
 #[test]
 fn an_image_of_one_shade_is_read_however_small_its_file() {
     let (folder, path) = folder(&yaml("").replace("map.pgm", "map.png"));

@@ -37,7 +37,7 @@ pub(crate) enum Records {
 }
 
 impl Block {
-    /// The memory that the loaded records take, bytes.
+    /// The expected size of the loaded records, bytes.
     pub(crate) fn size(&self) -> u64 {
         match &self.records {
             Records::Bare(range) => range.len() as u64,
@@ -46,6 +46,14 @@ impl Block {
             Records::Chunk(chunk) => chunk.size,
             Records::Rows(rows) => rows.size,
             Records::Ros1(chunk) => chunk.size,
+        }
+    }
+
+    /// The memory that the loaded records take at most, bytes, unless messages are compressed individually.
+    pub(crate) fn most_memory(&self) -> u64 {
+        match &self.records {
+            Records::Chunk(chunk) if chunk.cut => chunk.most_contents().max(chunk.data.len() as u64),
+            _ => self.size(),
         }
     }
 
@@ -79,12 +87,14 @@ impl Block {
         matches!(&self.records, Records::Chunk(chunk) if chunk.cut)
     }
 
-    /// Loads the block's messages, into the memory of a released block. `definitions` are those of its file.
+    /// Loads the block's messages, into the memory of a released block. `definitions` are those of its file. Individually
+    /// compressed messages take at most `room` bytes.
     pub(crate) fn load(
         &self,
         storage: &Storage,
         definitions: &Definitions,
         memory: Memory,
+        room: u64,
     ) -> Result<LoadedBlock, ChunkFault> {
         let (records, lost) = match (&self.records, storage) {
             (Records::Rows(rows), Storage::Sqlite(database)) => database.contents(rows)?,
@@ -96,7 +106,7 @@ impl Block {
         if !index.may_be_compressed {
             return Ok(LoadedBlock { records, messages: index.messages, lost, later: 0, is_decompressed: false });
         }
-        let records = decompress_messages(&records, definitions)?;
+        let records = decompress_messages(&records, definitions, room.min(LARGEST))?;
         let messages = Index::of(&records, self.may_be_cut(), index.messages)?.messages;
         Ok(LoadedBlock { records, messages, lost, later: 0, is_decompressed: true })
     }
@@ -205,6 +215,11 @@ impl Index {
 }
 
 impl LoadedBlock {
+    /// The size of its contents, bytes.
+    pub(crate) fn size(&self) -> u64 {
+        (self.records.len() + self.messages.len() * size_of::<MessagePlace>()) as u64
+    }
+
     /// Releases its memory.
     pub(crate) fn into_memory(self) -> Memory {
         Memory { records: self.records, messages: self.messages }

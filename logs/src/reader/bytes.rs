@@ -2,6 +2,7 @@
 //! readers are killed by SIGBUS; `pread` only returns fewer bytes.
 
 use super::record::{HEAD, Record, wanted};
+use crate::temporary::Name;
 use gridweave_runtime::input_file;
 use rustix::buffer::spare_capacity;
 use rustix::io::{Errno, pread};
@@ -39,6 +40,17 @@ impl FileBytes {
     pub(crate) fn of(file: File) -> io::Result<Self> {
         let length = usize::try_from(file.metadata()?.len()).map_err(|_| io::ErrorKind::FileTooLarge)?;
         Ok(Self { file, length })
+    }
+
+    /// A name for a file without one.
+    pub(crate) fn name(&self) -> io::Result<Name> {
+        Name::of(&self.file)
+    }
+
+    /// The number of names of the file.
+    #[cfg(test)]
+    pub(crate) fn links(&self) -> Option<u64> {
+        self.file.metadata().ok().map(|file| std::os::unix::fs::MetadataExt::nlink(&file))
     }
 
     /// The length of the file when it was opened.

@@ -56,14 +56,19 @@ impl Chunk {
         Some((Self { first_time, last_time, compression, size, checksum, data: data..data, cut: false }, length))
     }
 
-    /// The chunk's records, decompressed and verified. They are stored in `memory`, whose contents are replaced. The
-    /// records of a truncated chunk are not verified.
-    pub(crate) fn contents(&self, file: &FileBytes, memory: Vec<u8>) -> Result<Vec<u8>, ChunkFault> {
-        let most = match self.size {
+    /// The maximum size of its contents, bytes.
+    pub(crate) fn most_contents(&self) -> u64 {
+        match self.size {
             // Recorders write this before a chunk is complete.
             0 | u64::MAX if self.cut => LARGEST_UNKNOWN_SIZE,
             size => size,
-        };
+        }
+    }
+
+    /// The chunk's records, decompressed and verified. They are stored in `memory`, whose contents are replaced. The
+    /// records of a truncated chunk are not verified.
+    pub(crate) fn contents(&self, file: &FileBytes, memory: Vec<u8>) -> Result<Vec<u8>, ChunkFault> {
+        let most = self.most_contents();
         // Limits what is read and what it decompresses to; a truncated chunk is decompressed in pieces.
         let most_read = if self.cut { most } else { most.max(self.data.len() as u64) };
         if most_read > LARGEST {

@@ -3,19 +3,18 @@
 use super::bytes::FileBytes;
 use super::chunk::decompress_zstd;
 use super::damage::ChunkFault;
-use super::damage::LARGEST;
 use super::definitions::Definitions;
 use super::record::{MessageRecord, push_message, record_at};
+use crate::temporary;
 use mcap::records::op;
 use std::io::{self, Read, Write};
-use tempfile::{NamedTempFile, TempPath};
 
 /// The magic bytes of a zstd frame. CDR messages start with a zero.
 pub(crate) const ZSTD_MAGIC: &[u8] = b"\x28\xb5\x2f\xfd";
 
-/// Copies the messages in `records`, with individually compressed ones decompressed. A message that cannot be
-/// decompressed is unchanged.
-pub(crate) fn decompress_messages(records: &[u8], definitions: &Definitions) -> Result<Vec<u8>, ChunkFault> {
+/// Copies the messages in `records`, with individually compressed ones decompressed, to at most `most` bytes. A message that
+/// cannot be decompressed is unchanged.
+pub(crate) fn decompress_messages(records: &[u8], definitions: &Definitions, most: u64) -> Result<Vec<u8>, ChunkFault> {
     let mut decompressed = Vec::new();
     let mut position = 0;
     while let Some(record) = record_at(records, position) {
@@ -26,7 +25,7 @@ pub(crate) fn decompress_messages(records: &[u8], definitions: &Definitions) -> 
         let message = MessageRecord::parse(record.body).ok_or(ChunkFault::Records)?;
         let MessageRecord { channel, sequence, log_time, publish_time, data } = message;
         let is_compressed = data.starts_with(ZSTD_MAGIC) && definitions.is_cdr(channel);
-        let room = LARGEST.saturating_sub(decompressed.len() as u64);
+        let room = most.saturating_sub(decompressed.len() as u64);
         let whole = if is_compressed { decompress(data, room)? } else { None };
         push_message(&mut decompressed, channel, sequence, log_time, publish_time, whole.as_deref().unwrap_or(data));
     }
@@ -47,27 +46,62 @@ fn decompress(data: &[u8], room: u64) -> Result<Option<Vec<u8>>, ChunkFault> {
     }
 }
 
-/// A decompressed file.
+/// The maximum size of a decompressed file, bytes: this, or so many times the size of the compressed one.
+const LARGEST_ANYWAY: u64 = 1 << 30;
+const LARGEST_RATIO: u64 = 1024;
+
+/// A decompressed file. It has no name, so nothing of it is left, however this process ends.
 pub(crate) struct Decompressed {
     pub(crate) bytes: FileBytes,
-    /// The path of the temporary file, which is deleted on drop; programs that have it open can still read it.
-    pub(crate) name: TempPath,
     /// Whether the compressed file was complete.
     pub(crate) is_whole: bool,
 }
 
 /// Decompresses a whole file to a temporary file.
+///
+/// # Errors
+/// The temporary file cannot be written, or would be too large.
 pub(crate) fn decompress_file(file: &FileBytes) -> io::Result<Decompressed> {
-    let (mut decompressed, name) = NamedTempFile::new()?.into_parts();
+    let most = LARGEST_ANYWAY.max(LARGEST_RATIO.saturating_mul(file.len() as u64));
+    decompress_up_to(file, most)
+}
+
+fn decompress_up_to(file: &FileBytes, most: u64) -> io::Result<Decompressed> {
+    let mut decompressed = temporary::file()?;
     let mut decoder = zstd::stream::read::Decoder::new(file.part(0..file.len()))?;
     let mut buffer = vec![0; 1 << 18];
+    let mut length = 0;
     let is_whole = loop {
         match decoder.read(&mut buffer) {
             Ok(0) => break true,
-            Ok(count) => decompressed.write_all(&buffer[..count])?,
+            Ok(count) => {
+                length += count as u64;
+                if length > most {
+                    let text = format!("it expands to more than {most} bytes, the maximum for its {}", file.len());
+                    return Err(io::Error::new(io::ErrorKind::FileTooLarge, text));
+                }
+                decompressed.write_all(&buffer[..count]).map_err(|error| temporary::in_words(&error))?;
+            }
             // The data before the damage is kept.
             Err(_) => break false,
         }
     };
-    Ok(Decompressed { bytes: FileBytes::of(decompressed)?, name, is_whole })
+    Ok(Decompressed { bytes: FileBytes::of(decompressed)?, is_whole })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_decompressed_up_to_its_limit_and_leaves_no_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("zeros.zstd");
+        std::fs::write(&path, zstd::stream::encode_all(io::repeat(0).take(3 << 20), 1).unwrap()).unwrap();
+        let file = FileBytes::open(&path).unwrap();
+        let Decompressed { bytes, is_whole } = decompress_up_to(&file, 3 << 20).unwrap();
+        assert_eq!((bytes.len(), is_whole, bytes.links()), (3 << 20, true, Some(0)));
+        let error = decompress_up_to(&file, (3 << 20) - 1).err().unwrap().to_string();
+        assert!(error.contains("more than 3145727 bytes"), "{error}");
+    }
 }

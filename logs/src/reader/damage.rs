@@ -6,6 +6,13 @@ use serde::Serialize;
 /// exhaust memory. A few bytes of a file can claim, and even decompress to, any size.
 pub(crate) const LARGEST: u64 = 1 << 30;
 
+/// The maximum size of the blocks that overlap in time, and so are in memory together, bytes; one block is always allowed.
+/// Recorders close a chunk after 1 to 16 MB.
+pub(crate) const LARGEST_OVERLAP: u64 = 1 << 30;
+
+/// The maximum number of reports of the same damage: a few packed bytes can expand to millions of damaged records.
+pub(crate) const MOST_REPORTS: usize = 1000;
+
 /// Damage to a log that was read as far as possible.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, thiserror::Error)]
 #[serde(tag = "damage", rename_all = "snake_case")]
@@ -48,6 +55,14 @@ pub enum Damage {
     /// Two different channels or schemas have the same number. The first is used.
     #[error("the log has two different descriptions of a channel or schema; the first is used")]
     Redefined,
+    /// The descriptions of channels take too much memory.
+    #[error(
+        "{count} channels were left out: the log describes more, and longer, message types than can be kept in memory"
+    )]
+    ManyDefinitions {
+        /// The number of channels.
+        count: usize,
+    },
     /// The index at the end has a wrong checksum and was not used.
     #[error("the index at the end of the file has a wrong checksum and was not used")]
     BadIndex,
@@ -114,6 +129,12 @@ pub enum ChunkFault {
         /// The claimed size, bytes.
         size: u64,
     },
+    /// It overlaps in time with others, which together exceed the maximum size.
+    #[error(
+        "it overlaps in time with others, and together they take more than the maximum of {} bytes; sort the log by time",
+        LARGEST_OVERLAP
+    )]
+    Overlap,
     /// There is not enough memory.
     #[error("there is not enough memory for its contents")]
     TooLarge,

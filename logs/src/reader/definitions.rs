@@ -8,6 +8,10 @@ use std::collections::BTreeMap;
 /// The maximum number of channels in a log: their numbers have 16 bits, and 0 and 65535 are reserved.
 pub(crate) const MOST_CHANNELS: usize = 65534;
 
+/// The maximum size of the descriptions of all channels of a log, bytes. Each channel counts with its schema, also if they share
+/// one: readers keep a parsed copy for each.
+const MOST_BYTES: usize = 64 << 20;
+
 /// The channels and schemas of one file, by number.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Definitions {
@@ -68,6 +72,20 @@ impl Definitions {
         for (id, channel) in other.channels {
             self.redefined += usize::from(differs(&mut self.channels, id, channel));
         }
+    }
+
+    /// Removes the channels with the greatest numbers if the descriptions of all are too large together. Returns the number
+    /// of those that it has removed.
+    pub(crate) fn limit(&mut self) -> usize {
+        let (before, mut left, schemas) = (self.channels.len(), MOST_BYTES, &self.schemas);
+        self.channels.retain(|_, channel| {
+            let schema = schemas.get(&channel.schema).map_or(0, |schema| schema.name.len() + schema.text.len());
+            let pairs: usize = channel.metadata.iter().map(|(key, value)| key.len() + value.len()).sum();
+            let size = schema + channel.topic.len() + channel.message_encoding.len() + pairs;
+            left = left.saturating_sub(size);
+            left > 0
+        });
+        before - self.channels.len()
     }
 
     /// Whether the messages of a channel are encoded as CDR.
@@ -134,4 +152,32 @@ fn read_channel(body: &[u8]) -> Option<(u16, ChannelRecord)> {
         metadata.insert(pairs.text()?, pairs.text()?);
     }
     Some((id, ChannelRecord { schema, topic, message_encoding, metadata }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_descriptions_of_all_channels_are_limited_together() {
+        let mut definitions = Definitions::default();
+        definitions
+            .schemas
+            .insert(1, Schema { name: "a/A".into(), encoding: "ros2msg".into(), text: vec![b' '; 1 << 20] });
+        let channel = |topic: &str| ChannelRecord {
+            schema: 1,
+            topic: topic.into(),
+            message_encoding: "cdr".into(),
+            metadata: BTreeMap::new(),
+        };
+        for number in 1..=60 {
+            definitions.channels.insert(number, channel("/a"));
+        }
+        assert_eq!((definitions.limit(), definitions.channel_count()), (0, 60));
+        for number in 61..=1000 {
+            definitions.channels.insert(number, channel("/b"));
+        }
+        assert_eq!((definitions.limit(), definitions.channel_count()), (937, 63));
+        assert!(definitions.channel_numbers().eq(1..=63));
+    }
 }

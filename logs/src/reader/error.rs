@@ -22,7 +22,7 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// Another error of the operating system.
-    #[error("{}: {cause}", .path.display())]
+    #[error("{}: {}", .path.display(), crate::os_error::of_reading(.cause))]
     Io {
         /// The path.
         path: PathBuf,
@@ -46,7 +46,7 @@ pub enum ReadError {
         fix: &'static str,
     },
     /// A compressed file cannot be decompressed.
-    #[error("{}: cannot decompress it: {cause}; the folder for temporary files (TMPDIR) needs room for the whole file", .path.display())]
+    #[error("{}: cannot decompress it: {cause}", .path.display())]
     Decompress {
         /// The file.
         path: PathBuf,
@@ -68,6 +68,14 @@ pub enum ReadError {
         path: PathBuf,
         /// The cause.
         cause: String,
+    },
+    /// A database has its messages only in a journal that its recorder did not merge.
+    #[error("{}: the recorder did not close the database, and its messages are in {}; `sqlite3 FILE 'pragma wal_checkpoint'` on a copy of both merges them", .path.display(), .journal.display())]
+    OnlyJournal {
+        /// The file.
+        path: PathBuf,
+        /// The journal.
+        journal: PathBuf,
     },
     /// The file starts like a log, and is truncated or damaged before its first whole message.
     #[error("{}: damaged before the first whole message ({damage}); use another copy", .path.display())]

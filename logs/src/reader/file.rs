@@ -49,25 +49,30 @@ impl LogFile {
         let size = file.len() as u64;
         let is_compressed = head(&file).starts_with(ZSTD_MAGIC);
         let is_map = map::is_called_so(&path);
-        let (storage, layout) = match is_compressed {
+        let (storage, mut layout) = match is_compressed {
             false if is_map => {
                 let log =
                     map::as_log(&path, thresholds).map_err(|cause| ReadError::Map { path: path.clone(), cause })?;
-                open_storage(&path, None, log)?
+                open_storage(&path, log, false)?
             }
-            false => open_storage(&path, None, file)?,
+            false => open_storage(&path, file, false)?,
             true => {
                 let decompressed = decompress_file(&file);
-                let Decompressed { bytes, name, is_whole } =
+                let Decompressed { bytes, is_whole } =
                     decompressed.map_err(|cause| ReadError::Decompress { path: path.clone(), cause })?;
-                let (storage, mut layout) = open_storage(&path, Some(&name), bytes)?;
+                let (storage, mut layout) = open_storage(&path, bytes, true)?;
                 layout.damage.extend((!is_whole).then_some(Damage::TruncatedCompressedFile));
                 (storage, layout)
             }
         };
+        let removed = layout.definitions.limit();
+        layout.damage.extend((removed > 0).then_some(Damage::ManyDefinitions { count: removed }));
         let loss = layout.damage.iter().find(|damage| !matches!(damage, Damage::Incomplete { .. }));
         match loss {
-            Some(damage) if layout.blocks.is_empty() => Err(ReadError::NothingLeft { path, damage: damage.clone() }),
+            Some(damage) if layout.blocks.is_empty() => Err(match sqlite::write_ahead_log(&path) {
+                Some(journal) if matches!(storage, Storage::Sqlite(_)) => ReadError::OnlyJournal { path, journal },
+                _ => ReadError::NothingLeft { path, damage: damage.clone() },
+            }),
             _ => Ok(Self { path, size, is_compressed, is_map, later: 0, storage, layout }),
         }
     }
@@ -186,20 +191,28 @@ fn head(bytes: &FileBytes) -> Vec<u8> {
     bytes.read(0..bytes.len().min(HEAD)).unwrap_or_default()
 }
 
-/// The container of a file by its first bytes, and its layout. A compressed file was decompressed to `decompressed`.
-fn open_storage(path: &Path, decompressed: Option<&Path>, bytes: FileBytes) -> Result<(Storage, Layout), ReadError> {
+/// The container of a file by its first bytes, and its layout. A decompressed file has no name.
+fn open_storage(path: &Path, bytes: FileBytes, is_decompressed: bool) -> Result<(Storage, Layout), ReadError> {
     let path = || path.to_owned();
     let head = head(&bytes);
     if head.is_empty() {
-        return Err(ReadError::Empty { path: path() });
+        return Err(match sqlite::write_ahead_log(&path()) {
+            Some(journal) => ReadError::OnlyJournal { path: path(), journal },
+            None => ReadError::Empty { path: path() },
+        });
     }
     if head.starts_with(MAGIC) {
         let layout = Layout::of(&bytes);
         return Ok((Storage::Mcap(bytes), layout));
     }
     if head.starts_with(sqlite::MAGIC) {
-        let opened = Database::open(&path(), decompressed, bytes);
-        let (database, layout) = opened.map_err(|cause| ReadError::Database { path: path(), cause })?;
+        let name = is_decompressed.then(|| bytes.name()).transpose();
+        let name = name.map_err(|cause| ReadError::Decompress { path: path(), cause })?;
+        let opened = Database::open(&path(), name, bytes);
+        let (database, layout) = opened.map_err(|cause| match sqlite::write_ahead_log(&path()) {
+            Some(journal) => ReadError::OnlyJournal { path: path(), journal },
+            None => ReadError::Database { path: path(), cause },
+        })?;
         return Ok((Storage::Sqlite(database), layout));
     }
     if head.starts_with(ros1::MAGIC) {

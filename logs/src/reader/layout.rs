@@ -1,9 +1,9 @@
 //! The layout of a file: its blocks, found by scanning its records without reading their contents.
 
-use super::block::{Block, Records};
+use super::block::{Block, Records, Survey};
 use super::bytes::{FileBytes, Window};
 use super::chunk::Chunk;
-use super::damage::{ChunkFault, Damage};
+use super::damage::{ChunkFault, Damage, LARGEST, MOST_REPORTS};
 use super::definitions::Definitions;
 use super::record::{Fields, HEAD, MessageRecord, Record};
 use super::summary::{Statistics, SummarySection};
@@ -55,29 +55,49 @@ impl Layout {
         layout.definitions.merge(summary.definitions);
         layout.statistics = summary.statistics;
         layout.survey(file, &unsure);
-        layout.damage.extend(std::iter::repeat_n(Damage::Redefined, layout.definitions.redefined));
+        let redefined = layout.definitions.redefined.min(MOST_REPORTS);
+        layout.damage.extend(std::iter::repeat_n(Damage::Redefined, redefined));
         layout
     }
 
     /// Scans the unsure blocks for their time spans and channels.
     fn survey(&mut self, file: &FileBytes, unsure: &[bool]) {
-        let blocks = std::mem::take(&mut self.blocks);
-        let surveys: Vec<_> =
-            blocks.par_iter().zip(unsure).map(|(block, &unsure)| unsure.then(|| block.survey(file))).collect();
-        for (mut block, survey) in blocks.into_iter().zip(surveys) {
-            match survey {
-                None => self.blocks.push(block),
-                Some(Err(fault)) => self.damage.push(Damage::BadChunk { fault }),
-                Some(Ok(survey)) => {
-                    self.definitions.merge(survey.definitions);
-                    if let Some((first, last)) = survey.times {
-                        (block.first_time, block.last_time) = (first, last);
-                        self.blocks.push(block);
-                    }
+        let blocks: Vec<_> = std::mem::take(&mut self.blocks).into_iter().zip(unsure.iter().copied()).collect();
+        let mut rest = blocks.as_slice();
+        while !rest.is_empty() {
+            let (batch, later) = rest.split_at(surveyed_together(rest));
+            rest = later;
+            let surveys: Vec<_> = batch.par_iter().map(|(block, unsure)| unsure.then(|| block.survey(file))).collect();
+            for ((block, _), survey) in batch.iter().zip(surveys) {
+                self.add_surveyed(block.clone(), survey);
+            }
+        }
+    }
+
+    /// Adds a block with what a scan of it has found, if it was scanned.
+    fn add_surveyed(&mut self, mut block: Block, survey: Option<Result<Survey, ChunkFault>>) {
+        match survey {
+            None => self.blocks.push(block),
+            Some(Err(fault)) => self.damage.push(Damage::BadChunk { fault }),
+            Some(Ok(survey)) => {
+                self.definitions.merge(survey.definitions);
+                if let Some((first, last)) = survey.times {
+                    (block.first_time, block.last_time) = (first, last);
+                    self.blocks.push(block);
                 }
             }
         }
     }
+}
+
+/// The number of blocks at the beginning that are scanned concurrently, at least one: they are in memory together.
+fn surveyed_together(blocks: &[(Block, bool)]) -> usize {
+    let mut size = 0_u64;
+    let fits = |(block, unsure): &&(Block, bool)| {
+        size = size.saturating_add(if *unsure { block.most_memory() } else { 0 });
+        size <= LARGEST / 4
+    };
+    blocks.iter().take_while(fits).count().max(1)
 }
 
 /// The scan of a file's records.

@@ -4,6 +4,7 @@ use super::bytes::FileBytes;
 use crate::map_file::{Thresholds, load_as};
 use crate::qos;
 use crate::schemas::schema_text;
+use crate::temporary;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, encode};
 use std::io::BufWriter;
@@ -27,9 +28,9 @@ pub(crate) fn as_log(path: &Path, thresholds: Thresholds) -> Result<FileBytes, S
     let message = OccupancyGrid { header, info: map.info, data: bytemuck::cast_slice(&map.cells) };
     let bytes = encode(&message).map_err(|error| error.to_string())?;
     let temporary =
-        |error: &dyn std::fmt::Display| format!("{}: cannot write a temporary file in TMPDIR: {error}", path.display());
+        |error: &dyn std::fmt::Display| format!("{}: cannot write a temporary file: {error}", path.display());
     let write = || -> Result<std::fs::File, mcap::McapError> {
-        let file = tempfile::tempfile()?;
+        let file = temporary::file()?;
         let mut writer = mcap::WriteOptions::new().compression(None).create(BufWriter::new(file.try_clone()?))?;
         let text = schema_text(OccupancyGrid::NAME).unwrap_or_default();
         let schema = writer.add_schema(OccupancyGrid::NAME, "ros2msg", text.as_bytes())?;

@@ -1,7 +1,7 @@
 //! The merged messages of several files: by log time, then by file, then by position in the file.
 
 use super::block::LoadedBlock;
-use super::damage::Damage;
+use super::damage::{Damage, MOST_REPORTS};
 use super::file::LogFile;
 use super::prefetch::{BlockId, Prefetcher};
 use gridweave_runtime::message::LogTime;
@@ -30,7 +30,7 @@ pub struct LogMessage<'a> {
 /// Reads the messages of some files in log time order.
 ///
 /// Chunks are decompressed ahead of their use. Apart from those, only chunks that overlap in time are in memory
-/// together.
+/// together, up to a maximum size: more of them are skipped, and reported as [`Damage`].
 pub struct LogReader {
     files: Arc<[LogFile]>,
     prefetcher: Prefetcher,
@@ -39,6 +39,8 @@ pub struct LogReader {
     /// Whether the message on top was returned.
     given: bool,
     last_time: u64,
+    /// The number of messages that were found out of order.
+    late: usize,
     damage: Vec<(usize, Damage)>,
     /// The files that were modified while they were read. Blocks that were prefetched before that do not replace those
     /// that were not.
@@ -98,6 +100,7 @@ impl LogReader {
             active: BinaryHeap::new(),
             given: false,
             last_time: 0,
+            late: 0,
             damage: Vec::new(),
             changed: BTreeSet::new(),
             bytes_taken: 0,
@@ -109,6 +112,12 @@ impl LogReader {
     /// be called before the first message is read.
     pub(crate) fn sample(&mut self, count: usize) {
         self.prefetcher.sample(count);
+    }
+
+    /// Sets the maximum size of the chunks that overlap in time, bytes.
+    #[cfg(test)]
+    pub(crate) fn limit_overlap(&mut self, most: u64) {
+        self.prefetcher.limit_held(most);
     }
 
     /// The files, in the order that breaks ties.
@@ -125,7 +134,8 @@ impl LogReader {
         let file = due.id.file;
         let message = due.block.message(due.index)?;
         if message.log_time < self.last_time {
-            self.damage.push((file, Damage::LateMessage));
+            self.late += 1;
+            self.damage.extend((self.late <= MOST_REPORTS).then_some((file, Damage::LateMessage)));
         }
         self.last_time = self.last_time.max(message.log_time);
         Some(LogMessage {
@@ -150,7 +160,7 @@ impl LogReader {
             Some(time) => active.time = time,
             None => {
                 let Reverse(Active { block, .. }) = PeekMut::pop(top);
-                self.prefetcher.release(block.into_memory());
+                self.prefetcher.release(block);
             }
         }
     }
@@ -163,14 +173,16 @@ impl LogReader {
         {
             self.bytes_taken = self.bytes_taken.saturating_add(size);
             match load {
-                _ if self.changed.contains(&id.file) => {}
+                Ok(block) if self.changed.contains(&id.file) => self.prefetcher.release(block),
+                Err(_) if self.changed.contains(&id.file) => {}
                 Ok(mut block) => {
                     block.set_later(self.files.get(id.file).map_or(0, LogFile::later));
                     if block.lost > 0 {
                         self.damage.push((id.file, Damage::LostMessages { count: block.lost }));
                     }
-                    if let Some(time) = block.time(0) {
-                        self.active.push(Reverse(Active { time, id, index: 0, block }));
+                    match block.time(0) {
+                        Some(time) => self.active.push(Reverse(Active { time, id, index: 0, block })),
+                        None => self.prefetcher.release(block),
                     }
                 }
                 Err(_) if self.files.get(id.file).is_some_and(|file| file.storage.is_cut()) => {

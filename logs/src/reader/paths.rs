@@ -2,6 +2,7 @@
 
 use super::error::ReadError;
 use crate::file::folder_of;
+use crate::yaml;
 use gridweave_runtime::input_file;
 use serde::Deserialize;
 use std::collections::BTreeSet;
@@ -75,7 +76,7 @@ fn described_files(description: &Path) -> Result<Vec<PathBuf>, ReadError> {
     if text.trim_matches(|one: char| one.is_whitespace() || one == '\0').is_empty() {
         return undescribed_files(folder_of(description));
     }
-    let bag: Description = serde_norway::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+    let bag: Description = yaml::parse(&text).map_err(wrong)?;
     let bag = bag.rosbag2_bagfile_information;
     if bag.relative_file_paths.is_empty() {
         return Err(wrong("it lists no files".into()));

@@ -3,7 +3,7 @@
 //! fresh memory.
 
 use super::block::{Block, LoadedBlock, Memory};
-use super::damage::ChunkFault;
+use super::damage::{ChunkFault, LARGEST, LARGEST_OVERLAP};
 use super::file::LogFile;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -32,6 +32,10 @@ pub(crate) struct Prefetcher {
     next: usize,
     started: VecDeque<Started>,
     started_bytes: u64,
+    /// The size of the blocks that were taken and not released, bytes.
+    held_bytes: u64,
+    /// The maximum of that; one block is always allowed.
+    most_held: u64,
     depth: usize,
     /// Memory of released blocks: reading into it is faster than into fresh memory.
     spare: Vec<Memory>,
@@ -66,6 +70,8 @@ impl Prefetcher {
             next: 0,
             started: VecDeque::new(),
             started_bytes: 0,
+            held_bytes: 0,
+            most_held: LARGEST_OVERLAP,
             depth: threads + 1,
             spare: Vec::new(),
             decompressed: BTreeSet::new(),
@@ -83,6 +89,12 @@ impl Prefetcher {
         self.order.retain(is_taken);
     }
 
+    /// Sets the maximum size of the blocks that are held, bytes.
+    #[cfg(test)]
+    pub(crate) fn limit_held(&mut self, most: u64) {
+        self.most_held = most;
+    }
+
     /// The least log time in the block that [`take`](Self::take) returns next.
     pub(crate) fn next_time(&self) -> Option<u64> {
         let id = self.started.front().map(|started| started.id).or_else(|| self.order.get(self.next).copied())?;
@@ -94,24 +106,58 @@ impl Prefetcher {
         self.start_all();
         let Started { id, size, load } = self.started.pop_front()?;
         self.started_bytes -= size;
+        // Whether a block has room does not depend on how many were prefetched, which depends on the number of processors.
         let load = match load {
-            // A thread panics only on a block that cannot be read.
-            Loading::Thread(thread) => thread.join().unwrap_or(Err(ChunkFault::Records)),
-            Loading::Later => {
-                let memory = self.memory_for(size);
-                let file = &self.files[id.file];
-                self.block(id)?.load(&file.storage, &file.layout.definitions, memory)
-            }
+            Loading::Thread(thread) => match thread.join().unwrap_or(Err(ChunkFault::Records)) {
+                // A thread panics only on a block that cannot be read.
+                _ if !self.has_room(size) => Err(ChunkFault::Overlap),
+                // Its messages are compressed individually, and take more than threads may load together.
+                Err(ChunkFault::TooMuch { .. }) => self.load(id, size),
+                load => load,
+            },
+            Loading::Later if !self.has_room(size) => Err(ChunkFault::Overlap),
+            Loading::Later => self.load(id, size),
         };
-        if load.as_ref().is_ok_and(|block| block.is_decompressed) {
-            self.decompressed.insert(id.file);
+        let load =
+            load.and_then(|block| if self.has_room(block.size()) { Ok(block) } else { Err(ChunkFault::Overlap) });
+        if let Ok(block) = &load {
+            self.held_bytes += block.size();
+            if block.is_decompressed {
+                self.decompressed.insert(id.file);
+            }
         }
         self.start_all();
-        Some((id, size, load))
+        let expected = self.block(id).map_or(size, Block::size);
+        Some((id, expected, load))
     }
 
-    /// Takes back the memory of a block for reuse.
-    pub(crate) fn release(&mut self, memory: Memory) {
+    /// Whether so many bytes may be held beside those that are; one block always may.
+    fn has_room(&self, size: u64) -> bool {
+        self.held_bytes == 0 || self.held_bytes.saturating_add(size) <= self.most_held
+    }
+
+    /// Loads a block on demand.
+    fn load(&mut self, id: BlockId, size: u64) -> Load {
+        let room = match self.held_bytes {
+            0 => LARGEST,
+            held => self.most_held.saturating_sub(held),
+        };
+        let memory = self.memory_for(size);
+        let file = &self.files[id.file];
+        let block = file.layout.blocks.get(id.block).ok_or(ChunkFault::Records)?;
+        match block.load(&file.storage, &file.layout.definitions, memory, room) {
+            Err(ChunkFault::TooMuch { size }) if self.held_bytes > 0 && size <= LARGEST => Err(ChunkFault::Overlap),
+            load => load,
+        }
+    }
+
+    /// Takes back a block, whose memory is reused.
+    pub(crate) fn release(&mut self, block: LoadedBlock) {
+        self.held_bytes -= block.size();
+        self.keep(block.into_memory());
+    }
+
+    fn keep(&mut self, memory: Memory) {
         self.spare.push(memory);
         let mut size: u64 = self.spare.iter().map(Memory::size).sum();
         while self.spare.len() > self.depth || size > PREFETCH_BYTES {
@@ -134,7 +180,7 @@ impl Prefetcher {
     fn start_all(&mut self) {
         while self.started.len() < self.depth
             && let Some(&id) = self.order.get(self.next)
-            && let Some(size) = self.block(id).map(Block::size)
+            && let Some(size) = self.block(id).map(Block::most_memory)
             && (self.started.is_empty() || self.started_bytes.saturating_add(size) <= PREFETCH_BYTES)
         {
             self.next += 1;
@@ -146,13 +192,14 @@ impl Prefetcher {
 
     fn start(&mut self, id: BlockId, size: u64) -> Loading {
         let is_work = self.decompressed.contains(&id.file) || self.block(id).is_some_and(Block::is_work);
-        if size < WORTH_A_THREAD || !is_work {
+        let has_room = self.has_room(self.started_bytes);
+        if size < WORTH_A_THREAD || !is_work || !has_room {
             return Loading::Later;
         }
         let (files, memory) = (Arc::clone(&self.files), self.memory_for(size));
         let load = move || {
             let file = &files[id.file];
-            file.layout.blocks[id.block].load(&file.storage, &file.layout.definitions, memory)
+            file.layout.blocks[id.block].load(&file.storage, &file.layout.definitions, memory, PREFETCH_BYTES)
         };
         // If no thread can be started, the block is loaded on demand.
         std::thread::Builder::new().name("log block".into()).spawn(load).map_or(Loading::Later, Loading::Thread)
@@ -167,13 +214,13 @@ mod tests {
     fn memory_is_reused_for_blocks_of_similar_size_up_to_a_limit() {
         let mut prefetcher = Prefetcher::new(Vec::new().into());
         let memory = |size: u64| Memory::with_room_for(size);
-        prefetcher.release(memory(1 << 20));
+        prefetcher.keep(memory(1 << 20));
         assert_eq!(prefetcher.memory_for((1 << 20) + 1).size(), 0);
         assert_eq!(prefetcher.memory_for((1 << 19) - 1).size(), 0);
         assert_eq!(prefetcher.memory_for(1 << 19).size(), 1 << 20);
         assert_eq!(prefetcher.memory_for(1 << 19).size(), 0);
         for size in [1, PREFETCH_BYTES + 1, 3, 4 << 20, 4 << 20, PREFETCH_BYTES - 5, 8 << 20].repeat(3) {
-            prefetcher.release(memory(size));
+            prefetcher.keep(memory(size));
             assert!(prefetcher.spare.len() <= prefetcher.depth);
             assert!(prefetcher.spare.iter().map(Memory::size).sum::<u64>() <= PREFETCH_BYTES);
         }

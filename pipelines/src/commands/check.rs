@@ -2,7 +2,7 @@
 
 use crate::shipped;
 use crate::status::Status;
-use crate::terminal::{eprint_line, print_line};
+use crate::terminal::{eprint_styled_line, print_line};
 use anyhow::Result;
 use clap::Args;
 use gridweave_runtime::pipeline::Overrides;
@@ -27,7 +27,7 @@ pub(crate) fn check(args: &CheckArgs, registry: &Registry) -> Result<Status> {
                 print_line(format_args!("{}: {} stages, no errors", path.display(), pipeline.stages.len()))?;
             }
             Err(errors) => {
-                eprint_line(errors.render(std::io::stderr().is_terminal()));
+                eprint_styled_line(errors.render(std::io::stderr().is_terminal()));
                 status = Status::BadUse;
             }
         }

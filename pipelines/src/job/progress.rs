@@ -5,6 +5,7 @@ use crate::terminal::eprint_line;
 use gridweave_runtime::engine::Observer;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::pipeline::Mode;
+use gridweave_runtime::terminal_text::escape;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Display;
 use std::io::IsTerminal;
@@ -54,7 +55,7 @@ impl Gauge {
         let left = time_left(self.begin.elapsed(), share).map_or_else(String::new, |left| format!(", {left} left"));
         if let Some(bar) = &self.bar {
             bar.set_position((share * STEPS) as u64);
-            bar.set_message(format!("{at}{left}"));
+            bar.set_message(escape(&format!("{at}{left}")).into_owned());
             return;
         }
         let Ok(mut last_line) = self.last_line.lock() else { return };

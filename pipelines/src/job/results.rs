@@ -6,12 +6,11 @@ use crate::status::BadUse;
 use anyhow::{Context, Result, bail};
 use gridweave_logs::summary::Summary;
 use gridweave_logs::{map_file, picture, summary};
-use gridweave_runtime::engine::RunReport;
+use gridweave_runtime::engine::{PrivateFolder, RunReport};
 use gridweave_runtime::pipeline::{Pipeline, StageSpec};
 use gridweave_runtime::stage::{InputPort, OutputPort, StageKind};
 use gridweave_stages::merge::map_placer;
 use std::path::{Path, PathBuf};
-use tempfile::TempDir;
 
 /// The topic of the merged map.
 const MERGED: &str = "/map";
@@ -26,7 +25,7 @@ pub(super) struct ResultSinks {
     summary: Option<PathBuf>,
     /// Number of files of the other sinks.
     files: u64,
-    _folder: TempDir,
+    _folder: PrivateFolder,
 }
 
 impl ResultSinks {
@@ -35,7 +34,7 @@ impl ResultSinks {
     /// # Errors
     /// A merged map is asked for, and no stage sends one.
     pub(super) fn attach(pipeline: &mut Pipeline, options: &RunOptions) -> Result<Self> {
-        let folder = TempDir::with_prefix("gridweave-").context("cannot make a folder for the summary")?;
+        let folder = PrivateFolder::create().context("cannot make a folder for the summary")?;
         let file = folder.path().join("summary.json");
         let is_attached = attach(pipeline, &summary::kind(), &file, |_, _, _| true)?;
         let mut files = 0;

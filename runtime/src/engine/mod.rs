@@ -5,6 +5,7 @@
 mod error;
 mod external_sender;
 mod links;
+mod private_folder;
 pub mod processes;
 mod report;
 mod run_folder;
@@ -22,6 +23,7 @@ mod work_timer;
 
 pub use error::{Failure, RunError};
 pub use external_sender::{ExternalSender, SenderStopper};
+pub use private_folder::PrivateFolder;
 pub use processes::{describe_exit, memory_of_process};
 pub use report::{RunReport, StageReport};
 pub use run_folder::{LeftOver, RunFolder, RunFolderError, RunningRun, clean, running_runs};

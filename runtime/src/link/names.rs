@@ -2,13 +2,14 @@
 
 use super::LinkError;
 use super::heap::{HeapLink, HeapPayloads};
-use super::shared_memory::SharedMemory;
+use super::shared_memory::begin_creation;
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::prelude::{Config, FileName, Path, SemanticString, ServiceName, SignalHandlingMode};
 use iceoryx2::service::Service;
 use std::fs::{self, Permissions};
 use std::io;
 use std::os::unix::fs::PermissionsExt;
+use std::sync::MutexGuard;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The name prefix and the scope of the services of one run.
@@ -54,12 +55,19 @@ impl RunNames {
         }
     }
 
+    /// Begins to create something of iceoryx2, where that is in the shared memory of the machine; `doing` describes the purpose. The
+    /// creation ends with the guard.
+    pub(super) fn begin_creation(
+        &self,
+        doing: impl FnOnce() -> String,
+    ) -> Result<Option<MutexGuard<'static, ()>>, LinkError> {
+        self.is_shared().then(|| begin_creation(doing)).transpose()
+    }
+
     /// Creates the iceoryx2 node of a thread or process of the run.
     pub fn node<S: Service>(&self) -> Result<Node<S>, LinkError> {
         let doing = || LinkError::shared(format!("open shared memory for the run {}", self.prefix));
-        if self.is_shared() {
-            SharedMemory::default().check_free(0, || format!("open shared memory for the run {}", self.prefix))?;
-        }
+        let _creation = self.begin_creation(|| format!("open shared memory for the run {}", self.prefix))?;
         let mut config = Config::default();
         config.global.prefix = FileName::new(self.prefix.as_bytes()).map_err(|e| doing()(&e))?;
         // The prefix is unique to this run: there are no nodes of other runs to clean up.

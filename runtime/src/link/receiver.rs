@@ -94,8 +94,10 @@ impl<S: Service + 'static> LinkReceiver<S> {
     ) -> Result<Self, LinkError> {
         let name = shape.name();
         let service = shape.open(node, names)?;
+        let creation = names.begin_creation(|| format!("open the link {name}"))?;
         let subscriber = service.subscriber_builder().buffer_size(shape.buffer(end.depth)).create();
         let subscriber = subscriber.map_err(|e| LinkError::shared(format!("subscribe to {name}"))(&e))?;
+        drop(creation);
         Ok(Self {
             service,
             subscriber,

@@ -107,7 +107,9 @@ impl<S: Service + 'static> LinkSender<S> {
     ) -> Result<Self, LinkError> {
         let name = shape.name();
         let service = shape.open(node, names)?;
+        let creation = names.begin_creation(|| format!("open the link {name}"))?;
         let publisher = shape.publisher(&service)?;
+        drop(creation);
         let origin = origin(publisher.id().value());
         let is_first = port.counters.get(StageCounter::Restarts) == 0;
         let has_history = shape.order == Order::Arrival && role != SenderRole::External;

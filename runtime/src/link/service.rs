@@ -1,7 +1,6 @@
 //! The iceoryx2 service of a link, and its sizes.
 
 use super::counters::MAX_SENDERS;
-use super::shared_memory::SharedMemory;
 use super::stage_counters::StageCounters;
 use super::{LinkError, Order, RunNames, SampleHeader};
 use crate::pipeline::Overflow;
@@ -94,9 +93,7 @@ impl LinkShape<'_> {
         names: &RunNames,
     ) -> Result<PortFactory<S, [u8], SampleHeader>, LinkError> {
         let failed = |cause: &dyn std::fmt::Debug| LinkError::shared(format!("open the link {}", self.name()))(cause);
-        if names.is_shared() {
-            SharedMemory::default().check_free(0, || format!("open the link {}", self.name()))?;
-        }
+        let _creation = names.begin_creation(|| format!("open the link {}", self.name()))?;
         // A link that does not leave the process cannot be observed.
         let (observers, mut buffer) = match names.is_shared() {
             true => (MAX_OBSERVERS, self.buffer(self.depth).max(OBSERVER_BUFFER)),

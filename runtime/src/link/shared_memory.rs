@@ -12,6 +12,7 @@ use rustix::param::page_size;
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// The folder of the files of shared memory.
 pub(crate) const SHARED_MEMORY_FOLDER: &str = "/dev/shm";
@@ -74,6 +75,22 @@ impl SharedMemory {
             }
         }
     }
+}
+
+/// One thread of this process at a time creates what iceoryx2 keeps in shared memory, and only where there is space for it: each
+/// thread would find the same free space otherwise.
+static CREATION: Mutex<()> = Mutex::new(());
+
+/// Waits until nobody else creates anything, and checks that there is space; `doing` describes the purpose. The creation ends with
+/// the guard.
+///
+/// # Errors
+/// There is not enough space.
+pub(crate) fn begin_creation(doing: impl FnOnce() -> String) -> Result<MutexGuard<'static, ()>, LinkError> {
+    // It guards no data that a panic could leave incomplete.
+    let guard = CREATION.lock().unwrap_or_else(PoisonError::into_inner);
+    SharedMemory::default().check_free(0, doing)?;
+    Ok(guard)
 }
 
 /// Commits the memory that is mapped at some addresses without changing its contents.

@@ -79,16 +79,18 @@ pub(super) fn push_table<const N: usize>(page: &mut String, indent: usize, width
     };
     for row in rows {
         let cells = row.iter().zip(widths).take(N - 1);
-        let mut line: String = cells.map(|(cell, width)| format!("{cell:<width$}  ")).collect();
+        // A width of the format panics beyond 65535.
+        let padded = |(cell, width): (&String, usize)| cell.clone() + &" ".repeat(width - cell.chars().count() + 2);
+        let mut line: String = cells.map(padded).collect();
         let mut at = before;
         if !fits_beside {
             for (number, part) in fill_cells(&line, width.saturating_sub(indent + 2)).iter().enumerate() {
-                push(&format!("{:indent$}{part}", "", indent = indent + if number == 0 { 0 } else { 2 }));
+                push(&(" ".repeat(indent + if number == 0 { 0 } else { 2 }) + part));
             }
             (line, at) = (String::new(), indent + 4);
         }
         for part in wrap_words(&row[N - 1], width.saturating_sub(at)) {
-            push(&format!("{:start$}{line}{part}", "", start = if line.is_empty() { at } else { indent }));
+            push(&(" ".repeat(if line.is_empty() { at } else { indent }) + &line + &part));
             line.clear();
         }
     }

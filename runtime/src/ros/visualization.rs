@@ -33,7 +33,7 @@ pub struct Marker {
     /// The type of the shape: see the constants.
     #[serde(rename = "type")]
     pub shape: i32,
-    /// The action: [`ADD`](Self::ADD) or [`DELETE_ALL`](Self::DELETE_ALL).
+    /// The action: [`ADD`](Self::ADD), [`DELETE`](Self::DELETE) or [`DELETE_ALL`](Self::DELETE_ALL).
     pub action: i32,
     /// The pose of the shape.
     pub pose: Pose,
@@ -78,6 +78,8 @@ impl Marker {
     pub const TEXT: i32 = 9;
     /// Adds the shape, or replaces the one with the same namespace and id.
     pub const ADD: i32 = 0;
+    /// Deletes the shape with the same namespace and id.
+    pub const DELETE: i32 = 2;
     /// Deletes all shapes of the topic.
     pub const DELETE_ALL: i32 = 3;
 }

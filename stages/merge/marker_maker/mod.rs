@@ -4,6 +4,7 @@
 //! Shapes are in the frame of the feature, which is its robot's map: viewers place them by `/tf_static`. Deformations
 //! are left out, as transforms are rigid.
 
+mod hypothesis_markers;
 mod shapes;
 mod stage;
 #[cfg(test)]

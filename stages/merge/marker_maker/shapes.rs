@@ -88,15 +88,23 @@ pub fn ways(found: &TopologicalMap, colour: [u8; 3]) -> MarkerArray {
 
 /// Relative poses of hypotheses: the x axis of map b's frame in map a's, a line from one origin to the other, and the
 /// score; bluish green where it is accepted, vermilion where it is refused.
-pub fn hypotheses<'a>(found: impl Iterator<Item = &'a Alignment>) -> MarkerArray {
-    let mut header = Header::default();
+pub fn hypotheses<'a>(found: impl Iterator<Item = &'a Alignment> + Clone) -> MarkerArray {
+    let stamps = found.clone().filter(|one| is_shown(one)).map(|one| one.header.stamp);
+    let header = Header { stamp: stamps.max().unwrap_or_default(), ..Header::default() };
+    array(&header, hypothesis_shapes(found))
+}
+
+/// Whether a hypothesis has a relative pose to show.
+fn is_shown(hypothesis: &Alignment) -> bool {
+    let Alignment { has_transform, x, y, yaw, .. } = *hypothesis;
+    has_transform && [x, y, yaw].iter().all(|value| value.is_finite())
+}
+
+/// The shapes of hypotheses, without numbers.
+pub(super) fn hypothesis_shapes<'a>(found: impl Iterator<Item = &'a Alignment>) -> Vec<Marker> {
     let mut shapes = Vec::new();
-    for alignment in found.filter(|one| one.has_transform) {
+    for alignment in found.filter(|one| is_shown(one)) {
         let Alignment { x, y, yaw, .. } = *alignment;
-        if ![x, y, yaw].iter().all(|value| value.is_finite()) {
-            continue;
-        }
-        header.stamp = alignment.header.stamp.max(header.stamp);
         let sort = if alignment.accepted { "accepted" } else { "refused" };
         let colour = rgba(if alignment.accepted { ACCEPTED } else { REFUSED }, 0.9);
         let mut line = Lines::default();
@@ -107,7 +115,7 @@ pub fn hypotheses<'a>(found: impl Iterator<Item = &'a Alignment>) -> MarkerArray
             shapes.push(Marker { header: alignment.header.clone(), ..marker });
         }
     }
-    array(&header, shapes)
+    shapes
 }
 
 /// Numbers the shapes, after one that deletes all earlier ones; those without a frame get that of the header.

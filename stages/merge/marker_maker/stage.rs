@@ -1,5 +1,6 @@
 //! The marker maker as a stage.
 
+use super::hypothesis_markers::HypothesisMarkers;
 use super::{direction, hypotheses, segments, tags, ways};
 use gridweave_runtime::robot_colour::robot_colour;
 use gridweave_runtime::ros::{Alignment, MapDirection, MarkerArray, Segments, TagEstimates, TopologicalMap, Verdicts};
@@ -19,6 +20,7 @@ pub fn kind() -> StageKind {
     .optional_inputs("topology", "topological maps", MarkerMaker::topology)
     .optional_inputs("alignment", "hypotheses of the relative poses of maps", MarkerMaker::alignment)
     .optional_inputs("verdicts", "the verdict on each pair of robots", MarkerMaker::verdicts)
+    .finish(MarkerMaker::finish)
     .build()
 }
 
@@ -42,20 +44,21 @@ impl Outputs for Markers {
             ),
             tags: ports.output_on("/{robot}/markers/tags", "tags", "the tags as ellipses of two standard deviations"),
             ways: ports.output_on("/{robot}/markers/ways", "ways", "topological maps as lines and balls"),
-            hypotheses: ports.output_on("/markers/hypotheses", "hypotheses", "the relative poses of the hypotheses"),
+            hypotheses: ports.output_on(
+                "/markers/hypotheses",
+                "hypotheses",
+                "the relative poses of the hypotheses: of all pairs, or, where they are many, of the one that has changed",
+            ),
             graph: ports.output_on("/markers/graph", "graph", "the pairs of robots, and the verdict on each"),
         }
     }
 }
 
-/// Source of hypotheses: its wire, and the pair of robots.
-type Source = (usize, String, String);
-
 #[derive(Default)]
 struct MarkerMaker {
     /// In the order of their first message.
     robots: Vec<String>,
-    hypotheses: BTreeMap<Source, Vec<Alignment>>,
+    hypotheses: HypothesisMarkers,
     /// Frame of a robot's map.
     frames: BTreeMap<String, String>,
 }
@@ -97,13 +100,19 @@ impl MarkerMaker {
             self.frames.insert(alignment.a.clone(), alignment.header.frame_id.clone());
         }
         let is_last = alignment.rank + 1 >= alignment.hypotheses;
-        let of_pair = self.hypotheses.entry(source).or_default();
-        of_pair.truncate(alignment.rank as usize);
-        of_pair.push(alignment);
+        self.hypotheses.push(source.clone(), alignment);
         if !is_last {
             return Ok(());
         }
-        output.hypotheses.send("", &hypotheses(self.hypotheses.values().flatten()))
+        output.hypotheses.send("", &self.hypotheses.changed(&source))
+    }
+
+    /// The last message shows all hypotheses.
+    fn finish(&mut self, output: &Output<Markers>) -> Result<(), StageError> {
+        match self.hypotheses.rest() {
+            Some(shapes) => output.hypotheses.send("", &shapes),
+            None => Ok(()),
+        }
     }
 
     /// Verdicts name no frames: their frames are those of the alignments.

@@ -16,6 +16,9 @@ use gridweave_runtime::message::Channel;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+/// The maximum length of the definitions of all connections, bytes. A connection beyond it has no definition.
+const MOST_DEFINITIONS: usize = 32 << 20;
+
 /// A ROS 1 bag.
 #[derive(Debug)]
 pub(crate) struct Bag {
@@ -48,7 +51,12 @@ pub(crate) struct BagChunk {
 impl Bag {
     /// Opens the bag in a file and determines its layout.
     pub(crate) fn open(file: FileBytes) -> (Self, Layout) {
-        let mut walk = Walk { layout: Layout::default(), connections: BTreeMap::new(), unsure: Vec::new() };
+        let mut walk = Walk {
+            layout: Layout::default(),
+            connections: BTreeMap::new(),
+            unsure: Vec::new(),
+            definitions_left: MOST_DEFINITIONS,
+        };
         walk.walk(&file);
         walk.survey(&file);
         let Walk { layout, connections, .. } = walk;
@@ -62,6 +70,8 @@ struct Walk {
     connections: Connections,
     /// For each block, whether its time span is unknown.
     unsure: Vec<bool>,
+    /// The length that further definitions may have, bytes.
+    definitions_left: usize,
 }
 
 impl Walk {
@@ -129,7 +139,10 @@ impl Walk {
         let Ok(channel) = u16::try_from(self.connections.len() + 1) else { return };
         let topic = header.text("topic").or_else(|| data_header.text("topic")).unwrap_or_default();
         let schema_name = type_name(&data_header.text("type").unwrap_or_default());
-        let schema = translate(&data_header.text("message_definition").unwrap_or_default());
+        let definition = data_header.bytes("message_definition").unwrap_or_default();
+        let definition = if definition.len() <= self.definitions_left { definition } else { &[] };
+        self.definitions_left -= definition.len();
+        let schema = translate(&String::from_utf8_lossy(definition));
         let recoder = Schema::parse(&schema_name, &schema).ok().and_then(Recoder::new);
         let latched = data_header.bytes("latching") == Some(b"1");
         let offered = if latched { qos::LATCHED } else { "" };
@@ -233,7 +246,7 @@ impl BagChunk {
                 }
                 Some(_) => {}
             }
-            if records.len() as u64 > LARGEST {
+            if (records.len() + message.len()) as u64 > LARGEST {
                 return Err(ChunkFault::TooLarge);
             }
             push_message(&mut records, channel, sequence, time, time, &message);

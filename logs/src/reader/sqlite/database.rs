@@ -6,6 +6,7 @@ use super::torn::Pages;
 use crate::reader::bytes::FileBytes;
 use crate::reader::damage::{ChunkFault, Damage};
 use crate::reader::layout::Layout;
+use crate::temporary::Name;
 use rusqlite::{Connection, OpenFlags};
 use std::collections::BTreeMap;
 use std::fs;
@@ -27,28 +28,35 @@ pub(crate) struct Database {
     channels: BTreeMap<i64, u16>,
     /// The ids of rows with incomplete messages, ascending.
     torn: Vec<i64>,
+    /// The name of the number of a row of `messages`.
+    row_number: &'static str,
 }
 
 impl Database {
-    /// Opens the database at `path` and determines its layout. A compressed one was decompressed to `decompressed`.
+    /// Opens the database at `path` and determines its layout. A compressed one was decompressed to `decompressed`, whose name
+    /// is removed.
     ///
     /// # Errors
     /// The cause, if no message can be read.
-    pub(crate) fn open(path: &Path, decompressed: Option<&Path>, file: FileBytes) -> Result<(Self, Layout), String> {
+    pub(crate) fn open(path: &Path, decompressed: Option<Name>, file: FileBytes) -> Result<(Self, Layout), String> {
         let text_of = |error: rusqlite::Error| error.to_string();
-        let connection = connect(decompressed.unwrap_or(path)).map_err(text_of)?;
+        let connection = connect(decompressed.as_ref().map_or(path, Name::path)).map_err(text_of)?;
+        drop(decompressed);
         let mut layout = Layout::default();
         let cut = cut(&file);
         let torn = if cut.is_some() { torn_rows(&connection, &file) } else { Vec::new() };
         layout.damage.extend(cut);
         layout.damage.extend(beside(path));
-        let topics = tables::read_topics(&connection, &mut layout)?;
-        let channels = topics.into_iter().collect();
-        survey(&connection, &mut layout).map_err(text_of)?;
+        let channels = tables::read_topics(&connection, &mut layout, file.len())?;
+        let messages = tables::table(&connection, "messages").map_err(text_of)?;
+        let row_number = messages.and_then(|table| table.row_number());
+        let row_number =
+            row_number.ok_or("the rows of its table `messages` have no number, so it is not a rosbag2 bag")?;
+        survey(&connection, row_number, &torn, file.len() as u64, &mut layout).map_err(text_of)?;
         if layout.blocks.is_empty() && !layout.damage.is_empty() && layout.definitions.channel_count() == 0 {
             return Err("it has no readable topic".to_owned());
         }
-        Ok((Self { file, connection: Mutex::new(connection), channels, torn }, layout))
+        Ok((Self { file, connection: Mutex::new(connection), channels, torn, row_number }, layout))
     }
 
     pub(crate) fn is_cut(&self) -> bool {
@@ -62,7 +70,7 @@ impl Database {
     pub(crate) fn contents(&self, rows: &Rows) -> Result<(Vec<u8>, u64), ChunkFault> {
         // A panicking thread leaves the connection usable.
         let connection = self.connection.lock().unwrap_or_else(PoisonError::into_inner);
-        rows.contents(&connection, &self.torn, &self.channels)
+        rows.contents(&connection, self.row_number, &self.torn, &self.channels)
     }
 }
 
@@ -109,11 +117,18 @@ fn cut(file: &FileBytes) -> Option<Damage> {
 
 /// The damage if a killed recorder has left a journal beside the database, which is not read.
 fn beside(path: &Path) -> Option<Damage> {
-    ["-wal", "-journal"].iter().find_map(|ending| {
-        let mut name = path.as_os_str().to_owned();
-        name.push(ending);
-        let rest = PathBuf::from(name);
-        let is_rest = fs::metadata(&rest).is_ok_and(|file| file.len() > 0);
-        is_rest.then(|| Damage::NotClosed { rest: rest.display().to_string() })
-    })
+    let rest = ["-wal", "-journal"].iter().find_map(|ending| journal(path, ending))?;
+    Some(Damage::NotClosed { rest: rest.display().to_string() })
+}
+
+/// The journal of changes beside a database, if there is one.
+pub(crate) fn write_ahead_log(path: &Path) -> Option<PathBuf> {
+    journal(path, "-wal")
+}
+
+fn journal(path: &Path, ending: &str) -> Option<PathBuf> {
+    let mut name = path.as_os_str().to_owned();
+    name.push(ending);
+    let journal = PathBuf::from(name);
+    fs::metadata(&journal).is_ok_and(|file| file.len() > 0).then_some(journal)
 }

@@ -13,7 +13,7 @@ mod torn;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use database::Database;
+pub(crate) use database::{Database, write_ahead_log};
 pub(crate) use rows::Rows;
 
 /// The magic bytes of a database.

@@ -42,23 +42,34 @@ impl Place {
     }
 }
 
-/// Scans all rows, and adds runs of them to the layout as blocks.
-pub(super) fn survey(connection: &Connection, layout: &mut Layout) -> rusqlite::Result<()> {
+/// Scans all rows, and adds runs of them to the layout as blocks. `row_number` is the name of their numbers; the rows `torn`,
+/// ascending, are incomplete; the messages of the others take at most `room` bytes: the length of the database.
+pub(super) fn survey(
+    connection: &Connection,
+    row_number: &str,
+    torn: &[i64],
+    room: u64,
+    layout: &mut Layout,
+) -> rusqlite::Result<()> {
     // The length of a message is known without reading it.
-    let query = "SELECT rowid, timestamp, length(data) FROM messages WHERE rowid >= ?1 ORDER BY rowid";
-    let mut statement = connection.prepare(query)?;
-    let mut runs = Runs { layout, run: None };
+    let query = format!(
+        "SELECT {row_number}, timestamp, octet_length(data) FROM messages WHERE {row_number} >= ?1 ORDER BY {row_number}"
+    );
+    let mut statement = connection.prepare(&query)?;
+    let mut runs = Runs { layout, run: None, torn, room };
     let (mut from, mut gaps) = (i64::MIN, 0);
     loop {
         let mut last = None;
         let ended = walk(&mut statement, from, |place| {
-            last = Some(place.number);
-            runs.push(&place);
+            // Pages that are linked in a ring have rows without end.
+            let is_taken = last.is_none_or(|last| place.number > last) && runs.push(&place);
+            last = if is_taken { Some(place.number) } else { last };
+            is_taken
         });
         let next = last.map_or(Some(from), |last: i64| last.checked_add(1));
         match (ended, next) {
-            (Ok(()), _) | (_, None) => break,
-            (Err(_), Some(lost_from)) => {
+            (Ok(true), _) | (_, None) => break,
+            (Ok(false) | Err(_), Some(lost_from)) => {
                 // A run is read without gaps.
                 runs.end();
                 gaps += 1;
@@ -75,12 +86,15 @@ pub(super) fn survey(connection: &Connection, layout: &mut Layout) -> rusqlite::
     Ok(())
 }
 
-fn walk(statement: &mut Statement<'_>, from: i64, mut take: impl FnMut(Place)) -> rusqlite::Result<()> {
+/// Passes the rows to `take` until it refuses one; whether it took all.
+fn walk(statement: &mut Statement<'_>, from: i64, mut take: impl FnMut(Place) -> bool) -> rusqlite::Result<bool> {
     let mut rows = statement.query([from])?;
     while let Some(row) = rows.next()? {
-        take(Place::of(row)?);
+        if !take(Place::of(row)?) {
+            return Ok(false);
+        }
     }
-    Ok(())
+    Ok(true)
 }
 
 /// The next id after `lost` at which a row can be read; `None` if there is none.
@@ -114,11 +128,19 @@ fn behind(statement: &mut Statement<'_>, lost: i64) -> Option<i64> {
 struct Runs<'a> {
     layout: &'a mut Layout,
     run: Option<Block>,
+    /// The ids of incomplete rows, ascending.
+    torn: &'a [i64],
+    /// The number of bytes that further messages may take.
+    room: u64,
 }
 
 impl Runs<'_> {
-    fn push(&mut self, place: &Place) {
+    /// Adds a row; `false` if its message cannot be in the file.
+    fn push(&mut self, place: &Place) -> bool {
         let Place { number, time, size } = *place;
+        let size = if self.torn.binary_search(&number).is_ok() { 0 } else { size };
+        let Some(room) = self.room.checked_sub(size) else { return false };
+        self.room = room;
         let run = self.run.get_or_insert(Block {
             first_time: time,
             last_time: time,
@@ -126,13 +148,14 @@ impl Runs<'_> {
         });
         run.first_time = run.first_time.min(time);
         run.last_time = run.last_time.max(time);
-        let Records::Rows(rows) = &mut run.records else { return };
+        let Records::Rows(rows) = &mut run.records else { return false };
         rows.last = number;
         rows.count += 1;
         rows.size = rows.size.saturating_add(size);
         if rows.size >= RUN_BYTES || rows.count >= RUN_ROWS {
             self.end();
         }
+        true
     }
 
     fn end(&mut self) {
@@ -141,18 +164,19 @@ impl Runs<'_> {
 }
 
 impl Rows {
-    /// The messages of the rows as MCAP records, and the number of unreadable ones. The rows `torn`, ascending, are
-    /// incomplete; `channels` are the channel numbers of the topics.
+    /// The messages of the rows as MCAP records, and the number of unreadable ones. `row_number` is the name of their numbers; the
+    /// rows `torn`, ascending, are incomplete; `channels` are the channel numbers of the topics.
     pub(super) fn contents(
         &self,
         connection: &Connection,
+        row_number: &str,
         torn: &[i64],
         channels: &BTreeMap<i64, u16>,
     ) -> Result<(Vec<u8>, u64), ChunkFault> {
         if self.size > LARGEST {
             return Err(ChunkFault::TooMuch { size: self.size });
         }
-        let mut reading = Reading { torn, channels, records: Vec::new(), read: 0, last: None };
+        let mut reading = Reading { row_number, torn, channels, records: Vec::new(), seen: 0, read: 0, last: None };
         // The size is claimed by the database, so it is not trusted.
         let _ = reading.records.try_reserve(usize::try_from(self.size.min(2 * RUN_BYTES)).unwrap_or(0));
         if reading.all(connection, self).is_err() {
@@ -166,10 +190,12 @@ impl Rows {
 }
 
 struct Reading<'a> {
+    row_number: &'a str,
     torn: &'a [i64],
     channels: &'a BTreeMap<i64, u16>,
     records: Vec<u8>,
-    /// The number of rows read, and the id of the last one.
+    /// The number of rows seen and of messages read, and the id of the last row.
+    seen: u64,
     read: u64,
     last: Option<i64>,
 }
@@ -177,11 +203,17 @@ struct Reading<'a> {
 impl Reading<'_> {
     /// Reads the rows of a run, up to the first unreadable one.
     fn all(&mut self, connection: &Connection, rows: &Rows) -> rusqlite::Result<()> {
-        let query =
-            "SELECT rowid, timestamp, topic_id, data FROM messages WHERE rowid BETWEEN ?1 AND ?2 ORDER BY rowid";
-        let mut statement = connection.prepare(query)?;
+        let number = self.row_number;
+        let query = format!(
+            "SELECT {number}, timestamp, topic_id, data FROM messages WHERE {number} BETWEEN ?1 AND ?2 ORDER BY {number}"
+        );
+        let mut statement = connection.prepare(&query)?;
         let mut found = statement.query([rows.first, rows.last])?;
-        while let Some(row) = found.next()? {
+        // There are no more rows, unless pages are linked in a ring.
+        while self.seen < rows.count
+            && let Some(row) = found.next()?
+        {
+            self.seen += 1;
             self.take(row)?;
         }
         Ok(())
@@ -189,12 +221,19 @@ impl Reading<'_> {
 
     /// Reads the rows after the last one individually; unreadable ones are skipped.
     fn one_by_one(&mut self, connection: &Connection, rows: &Rows) -> rusqlite::Result<()> {
-        let mut next =
-            connection.prepare("SELECT rowid FROM messages WHERE rowid BETWEEN ?1 AND ?2 ORDER BY rowid LIMIT 1")?;
-        let mut one = connection.prepare("SELECT rowid, timestamp, topic_id, data FROM messages WHERE rowid = ?1")?;
+        let number = self.row_number;
+        let mut next = connection.prepare(&format!(
+            "SELECT {number} FROM messages WHERE {number} BETWEEN ?1 AND ?2 ORDER BY {number} LIMIT 1"
+        ))?;
+        let mut one = connection
+            .prepare(&format!("SELECT {number}, timestamp, topic_id, data FROM messages WHERE {number} = ?1"))?;
         let mut from = self.last.map_or(Some(rows.first), |last| last.checked_add(1));
         while let Some(start) = from.filter(|from| *from <= rows.last) {
             let Ok(number) = next.query_row([start, rows.last], |row| row.get::<_, i64>(0)) else { break };
+            // A row that is no later one is of pages that are linked in a ring.
+            if number < start {
+                break;
+            }
             // An unreadable row is lost.
             let _ = one.query_row([number], |row| self.take(row));
             from = number.checked_add(1);

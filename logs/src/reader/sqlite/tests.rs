@@ -164,6 +164,95 @@ fn other_databases_are_reported_and_their_code_is_not_run() {
     assert!(matches!(read_file(&short), Err(ReadError::NothingLeft { .. })));
 }
 
+/// Writes a database with these statements and returns its path.
+fn database(folder: &Folder, name: &str, statements: &str) -> PathBuf {
+    let path = folder.path().join(name);
+    Connection::open(&path).unwrap().execute_batch(statements).unwrap();
+    path
+}
+
+#[test]
+fn computed_columns_and_views_are_refused() {
+    let folder = Folder::new();
+    let topics = "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT,
+        offered_qos_profiles TEXT); INSERT INTO topics VALUES (1, '/x', 'p/msg/X', 'cdr', '');";
+    let messages = "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB);
+        INSERT INTO messages(topic_id, timestamp) VALUES (1, 1);";
+    let error = |name: &str, statements: &str| read_file(&database(&folder, name, statements)).unwrap_err().to_string();
+    let computed = messages.replace("data BLOB", "data BLOB AS (zeroblob(999999999))");
+    let text = error("data.db3", &format!("{topics}{computed}"));
+    assert!(text.contains("the column `data` of its table `messages` is computed"), "{text}");
+    let computed =
+        topics.replace("offered_qos_profiles TEXT", "offered_qos_profiles TEXT AS (hex(zeroblob(400000000)))");
+    let computed = computed.replace(", '')", ")");
+    let text = error("topics.db3", &format!("{computed}{messages}"));
+    assert!(text.contains("the column `offered_qos_profiles` of its table `topics` is computed"), "{text}");
+    // What the schema calls a table is a view.
+    let renamed = "PRAGMA writable_schema = ON;
+        UPDATE sqlite_schema SET sql = 'CREATE VIEW messages AS WITH RECURSIVE r(topic_id) AS (SELECT 1 UNION ALL
+            SELECT 1 FROM r) SELECT topic_id, 1 AS timestamp, NULL AS data FROM r' WHERE name = 'messages';";
+    let text = error("view.db3", &format!("{topics}{messages}{renamed}"));
+    assert!(text.contains("`messages`"), "{text}");
+    // Definitions that are computed are not read.
+    let definitions = "CREATE TABLE message_definitions(topic_type TEXT DEFAULT 'p/msg/X', encoding TEXT,
+        encoded_message_definition TEXT AS (hex(zeroblob(400000000)))); INSERT INTO message_definitions DEFAULT VALUES;";
+    let path = database(&folder, "definitions.db3", &format!("{topics}{messages}{definitions}"));
+    assert_eq!(LogFile::open(&path).unwrap().channels().count(), 1);
+}
+
+#[test]
+fn a_column_does_not_hide_the_number_of_a_row() {
+    let folder = Folder::new();
+    let tables = "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT,
+        offered_qos_profiles TEXT); INSERT INTO topics VALUES (1, '/x', 'p/msg/X', 'cdr', '');
+        CREATE TABLE messages(topic_id INTEGER, timestamp INTEGER, data BLOB, rowid INTEGER, _ROWID_ INTEGER);
+        WITH RECURSIVE n(i) AS (SELECT 0 UNION ALL SELECT i + 1 FROM n WHERE i < 39999)
+            INSERT INTO messages SELECT 1, i, x'01', 7, 7 FROM n;";
+    let path = database(&folder, "rowid.db3", tables);
+    let (messages, damage) = read_file(&path).unwrap();
+    assert!(messages.len() == 40_000 && messages.is_sorted_by_key(|(_, time, _)| *time));
+    assert_eq!(damage, []);
+    for (name, columns) in
+        [("all.db3", "data, rowid, _rowid_, oid"), ("none.db3", "data PRIMARY KEY) WITHOUT ROWID; --")]
+    {
+        let other = tables.replace("data BLOB, rowid INTEGER, _ROWID_ INTEGER", columns);
+        let other = other.split("WITH RECURSIVE").next().unwrap();
+        let text = read_file(&database(&folder, name, other)).unwrap_err().to_string();
+        assert!(text.contains("have no number"), "{text}");
+    }
+}
+
+#[test]
+fn messages_take_no_more_than_the_file_holds() {
+    const PAGE: usize = 4096;
+    let folder = Folder::new();
+    // Rows that share the pages of one of them, as only a forged database has them.
+    let path =
+        bag(&folder, "a.db3", &[(7, 1, vec![1; 40 * PAGE]), (7, 2, vec![2; 40 * PAGE]), (7, 3, vec![3; 40 * PAGE])]);
+    let mut bytes = fs::read(&path).unwrap();
+    let root = |connection: &Connection| {
+        let query = "SELECT rootpage FROM sqlite_schema WHERE name = 'messages'";
+        connection.query_row(query, [], |row| row.get::<_, i64>(0)).unwrap() as usize
+    };
+    let start = (root(&Connection::open(&path).unwrap()) - 1) * PAGE;
+    let number = |bytes: &[u8], at: usize| usize::from(u16::from_be_bytes([bytes[at], bytes[at + 1]]));
+    assert_eq!((bytes[start], number(&bytes, start + 3)), (0x0d, 3), "a leaf with three rows");
+    // The end of each cell is the number of the first page on which it continues.
+    let cells: Vec<usize> = (0..3).map(|cell| number(&bytes, start + 8 + 2 * cell)).collect();
+    let length = cells[0] - cells[1];
+    let first = bytes[start + cells[0] + length - 4..][..4].to_vec();
+    for cell in &cells {
+        bytes[start + cell + length - 4..][..4].copy_from_slice(&first);
+    }
+    // The other pages are cut off.
+    let pages = 60_u32;
+    bytes.truncate(pages as usize * PAGE);
+    bytes[28..32].copy_from_slice(&pages.to_be_bytes());
+    let (messages, damage) = read_file(&folder.write("shared.db3", &bytes)).unwrap();
+    assert_eq!(messages.len(), 1, "{damage:?}");
+    assert!(damage.iter().any(|damage| matches!(damage, Damage::LostRows { .. })), "{damage:?}");
+}
+
 #[test]
 fn the_journal_of_a_killed_recorder_is_reported() {
     let folder = Folder::new();
@@ -172,6 +261,27 @@ fn the_journal_of_a_killed_recorder_is_reported() {
     let (messages, damage) = read_file(&path).unwrap();
     assert_eq!(messages.len(), 3);
     assert!(matches!(&damage[..], [Damage::NotClosed { rest }] if rest.ends_with("a.db3-wal")));
+}
+
+#[test]
+fn a_database_with_all_messages_in_its_journal_is_reported_as_that() {
+    let folder = Folder::new();
+    let path = folder.path().join("a.db3");
+    let recorder = Connection::open(&path).unwrap();
+    recorder.execute_batch(&format!("PRAGMA journal_mode = WAL; PRAGMA wal_autocheckpoint = 0; {TABLES}")).unwrap();
+    // As a killed recorder leaves both: a database without tables, and one without bytes.
+    let journal = fs::read(folder.path().join("a.db3-wal")).unwrap();
+    for (name, database) in [("early.db3", fs::read(&path).unwrap()), ("empty.db3", Vec::new())] {
+        let copy = folder.write(name, &database);
+        folder.write(&format!("{name}-wal"), &journal);
+        let error = read_file(&copy).unwrap_err();
+        assert!(matches!(&error, ReadError::OnlyJournal { journal, .. } if journal.ends_with(format!("{name}-wal"))));
+        assert!(error.to_string().contains("wal_checkpoint"), "{error}");
+    }
+    // Tables, and no message.
+    let path = bag(&folder, "tables.db3", &[]);
+    folder.write("tables.db3-wal", &journal);
+    assert!(matches!(read_file(&path), Err(ReadError::OnlyJournal { .. })));
 }
 
 #[test]

@@ -39,18 +39,28 @@ impl<'a> Pages<'a> {
         let mut pending = vec![root];
         // Pages may point to each other in a cycle.
         let mut left = self.whole + 1;
+        // Each overflow page belongs to one row.
+        let mut overflow_left = self.whole;
         while let Some(number) = pending.pop() {
             let Some(page) = self.page(number) else { continue };
             let Some(fewer) = left.checked_sub(1) else { break };
             left = fewer;
-            let _ = self.look_into(&page, if number == 1 { FILE_HEADER } else { 0 }, &mut pending, &mut torn);
+            let start = if number == 1 { FILE_HEADER } else { 0 };
+            let _ = self.look_into(&page, start, &mut pending, &mut torn, &mut overflow_left);
         }
         torn.sort_unstable();
         torn
     }
 
     /// Scans a page of a table, as far as it is valid.
-    fn look_into(&self, page: &[u8], start: usize, pending: &mut Vec<usize>, torn: &mut Vec<i64>) -> Option<()> {
+    fn look_into(
+        &self,
+        page: &[u8],
+        start: usize,
+        pending: &mut Vec<usize>,
+        torn: &mut Vec<i64>,
+        overflow_left: &mut usize,
+    ) -> Option<()> {
         let cells = usize::from(u16::from_be_bytes(page.get(start + 3..start + 5)?.try_into().ok()?));
         let kind = *page.get(start)?;
         let pointers = match kind {
@@ -66,14 +76,14 @@ impl<'a> Pages<'a> {
             let cell = usize::from(u16::from_be_bytes(page.get(at..at + 2)?.try_into().ok()?));
             match kind {
                 INTERIOR => pending.push(number_at(page, cell)?),
-                _ => torn.extend(self.torn_row(page, cell)),
+                _ => torn.extend(self.torn_row(page, cell, overflow_left)),
             }
         }
         Some(())
     }
 
-    /// The id of the row in a cell, if it is incomplete.
-    fn torn_row(&self, page: &[u8], cell: usize) -> Option<i64> {
+    /// The id of the row in a cell, if it is incomplete, or needs more than `overflow_left` overflow pages.
+    fn torn_row(&self, page: &[u8], cell: usize, overflow_left: &mut usize) -> Option<i64> {
         let (length, used) = varint(page.get(cell..)?)?;
         let (row, more) = varint(page.get(cell + used..)?)?;
         let (length, most) = (usize::try_from(length).ok()?, self.usable - 35);
@@ -86,6 +96,8 @@ impl<'a> Pages<'a> {
         let local = if rest <= most { rest } else { least };
         let Some(mut next) = number_at(page, begin + local) else { return Some(row.cast_signed()) };
         for _ in 0..(length - local).div_ceil(self.usable - 4) {
+            let Some(left) = overflow_left.checked_sub(1) else { return Some(row.cast_signed()) };
+            *overflow_left = left;
             let place = next.checked_sub(1).filter(|_| next <= self.whole);
             let Some(place) = place else { return Some(row.cast_signed()) };
             let start = place * self.size;

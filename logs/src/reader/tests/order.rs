@@ -170,3 +170,43 @@ fn individually_compressed_messages_are_decompressed() {
         assert_eq!((data, damage), (vec![&b"short"[..], &long, b"plain"], vec![]));
     }
 }
+
+/// A log of five chunks with a message of 400 KB at the times of each, and of one at a later time.
+fn chunks(options: &mcap::WriteOptions, times: impl Fn(u64) -> [u64; 2], data: &[u8]) -> Vec<u8> {
+    let mut log = TestLog::new(options.clone());
+    for chunk in 0..5 {
+        for time in times(chunk) {
+            log.raw("/a", "p/msg/A", time, data);
+        }
+        log.flush();
+    }
+    log.raw("/a", "p/msg/A", 200, b"last");
+    log.finish()
+}
+
+#[test]
+fn chunks_that_overlap_in_time_take_limited_memory_and_the_others_are_reported() {
+    let folder = Folder::new();
+    let plain = vec![0; 400 << 10];
+    let packed = zstd::bulk::compress(&plain, 1).unwrap();
+    // Chunks that are compressed, or not, and messages that are.
+    let [_, bare, lz4, zstd] = layouts();
+    for (options, data) in [(&bare, &plain), (&lz4, &plain), (&zstd, &plain), (&bare, &packed), (&zstd, &packed)] {
+        let read = |times: fn(u64) -> [u64; 2], most: u64| {
+            let path = folder.write("a.mcap", &chunks(options, times, data));
+            let mut reader = LogReader::new(vec![LogFile::open(path).unwrap()]);
+            reader.limit_overlap(most);
+            read_all(reader)
+        };
+        let after_each_other: fn(u64) -> [u64; 2] = |chunk| [10 * chunk, 10 * chunk + 5];
+        let (seen, damage) = read(after_each_other, 2 << 20);
+        assert_eq!((seen.len(), damage), (11, Vec::new()));
+        let (seen, damage) = read(|chunk| [chunk, 100 + chunk], 2 << 20);
+        assert_eq!(times(&seen), [0, 1, 100, 101, 200], "two chunks are read");
+        assert!(seen[..4].iter().all(|(.., data)| data.len() == 400 << 10));
+        assert_eq!(damage, vec![Damage::BadChunk { fault: ChunkFault::Overlap }; 3]);
+        // One chunk is read, however large it is.
+        let (seen, damage) = read(after_each_other, 1000);
+        assert_eq!((seen.len(), damage), (11, Vec::new()));
+    }
+}

@@ -11,8 +11,8 @@ const LEVEL: i32 = 3;
 /// The base-2 logarithm of the largest window, which covers two maps of 64 million cells.
 const LARGEST_WINDOW: u32 = 27;
 const SMALLEST_WINDOW: u32 = 10;
-/// The maximum size of a message, bytes, as a guard against wrong sizes.
-pub(super) const MAX_SIZE: usize = 1 << 30;
+/// The maximum size of a message, and of a batch, bytes: a few packed bytes can claim, and expand to, any size.
+pub(super) const MAX_SIZE: usize = 128 << 20;
 
 /// The message, compressed with the dictionary `known`; without a dictionary if that is empty.
 ///
@@ -39,13 +39,19 @@ pub(super) fn difference(known: &[u8], message: &[u8]) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Restores the message from its difference to the same `known`.
+/// Restores the message, of at most `most` bytes, from its difference to the same `known`.
 ///
 /// # Errors
-/// The bytes are invalid, or were made with another dictionary.
-pub(super) fn message(known: &[u8], difference: &[u8]) -> io::Result<Vec<u8>> {
+/// The bytes are invalid, or were made with another dictionary; or the message is longer.
+pub(super) fn message(known: &[u8], difference: &[u8], most: usize) -> io::Result<Vec<u8>> {
     let size = get_frame_content_size(difference).ok().flatten().and_then(|size| usize::try_from(size).ok());
-    let size = size.filter(|size| *size <= MAX_SIZE).ok_or(io::ErrorKind::InvalidData)?;
+    let size = size.ok_or(io::ErrorKind::InvalidData)?;
+    if size > most {
+        return Err(io::Error::new(
+            io::ErrorKind::InvalidData,
+            format!("it expands to {size} bytes, more than {most}"),
+        ));
+    }
     let mut context = DCtx::try_create().ok_or(io::ErrorKind::OutOfMemory)?;
     context.set_parameter(DParameter::WindowLogMax(LARGEST_WINDOW)).map_err(failed)?;
     if !known.is_empty() {
@@ -85,27 +91,34 @@ mod tests {
         let whole = difference(&[], &after).unwrap();
         let new = difference(&before, &after).unwrap();
         assert!(new.len() * 4 < whole.len(), "{} and {} bytes", new.len(), whole.len());
-        assert_eq!(message(&before, &new).unwrap(), after);
-        assert_eq!(message(&[], &whole).unwrap(), after);
+        assert_eq!(message(&before, &new, MAX_SIZE).unwrap(), after);
+        assert_eq!(message(&[], &whole, MAX_SIZE).unwrap(), after);
     }
 
     #[test]
     fn a_wrong_dictionary_or_invalid_bytes_are_an_error() {
         let (before, after) = (cells(100, 100), cells(101, 100));
         let new = difference(&before, &after).unwrap();
-        assert!(message(&cells(102, 100), &new).is_err());
-        assert!(message(&[], &new).is_err());
-        assert!(message(&before, &new[..new.len() / 2]).is_err());
-        assert!(message(&before, b"nothing of that kind").is_err());
+        assert!(message(&cells(102, 100), &new, MAX_SIZE).is_err());
+        assert!(message(&[], &new, MAX_SIZE).is_err());
+        assert!(message(&before, &new[..new.len() / 2], MAX_SIZE).is_err());
+        assert!(message(&before, b"nothing of that kind", MAX_SIZE).is_err());
         let mut wrong = new.clone();
         let last = wrong.len() - 1;
         wrong[last] ^= 1;
-        assert!(message(&before, &wrong).is_err());
+        assert!(message(&before, &wrong, MAX_SIZE).is_err());
+    }
+
+    #[test]
+    fn a_message_beyond_the_limit_is_an_error() {
+        let packed = difference(&[], &[0; 5000]).unwrap();
+        assert_eq!(message(&[], &packed, 5000).unwrap().len(), 5000);
+        assert!(message(&[], &packed, 4999).unwrap_err().to_string().contains("expands to 5000 bytes"));
     }
 
     #[test]
     fn an_empty_message_is_restored() {
         let new = difference(&[], &[]).unwrap();
-        assert_eq!(message(&[], &new).unwrap(), b"");
+        assert_eq!(message(&[], &new, MAX_SIZE).unwrap(), b"");
     }
 }

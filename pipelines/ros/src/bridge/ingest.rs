@@ -2,11 +2,17 @@
 //!
 //! It takes the batches of each sender in order, each once, and restores the original messages.
 
-use super::difference::message;
+use super::difference::{MAX_SIZE, message};
 use super::wire::{Answer, Batch, Entry, Form, Link, Outcome, from_bytes};
 use gridweave_runtime::message::{Channel, LogTime, MessageHeader};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+
+/// The maximum number of senders, and of bytes that are kept for all of them: their links, and their last messages.
+const MAX_SENDERS: usize = 1000;
+const MAX_KEPT: usize = 512 << 20;
+/// The maximum size of the restored messages of a batch, bytes. They are in memory together.
+const MAX_RESTORED: usize = 512 << 20;
 
 /// An item of a batch.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,7 +100,16 @@ impl Ingest {
         if known.is_some_and(|known| (batch.handshake, number) < known) {
             return (told, answer(number, Outcome::Taken, ""));
         }
+        let kept = self.kept();
         if number == 0 {
+            let links_size: usize = batch.links.iter().map(|link| link.port.len() + link.ros_type.len() + LINK).sum();
+            let is_new = known.is_none();
+            if (is_new && self.senders.len() >= MAX_SENDERS) || kept.saturating_add(links_size) > MAX_KEPT {
+                let wrong = "there are too many senders, or they have too many links".to_owned();
+                let answer = answer(number, Outcome::Unreadable, &wrong);
+                told.wrong = Some(wrong);
+                return (told, answer);
+            }
             let links = batch.links.into_iter().map(Arc::new).collect();
             let before = self.senders.remove(&batch.session).unwrap_or_default();
             let Sender { correction, dropped, .. } = before;
@@ -112,7 +127,7 @@ impl Ingest {
             sender.correction = if offset.saturating_abs() > self.tolerance { offset } else { 0 };
             told.clock = Some(sender.correction);
         }
-        match sender.items(batch.entries) {
+        match sender.items(batch.entries, MAX_KEPT.saturating_sub(kept)) {
             Ok(items) => {
                 sender.next += 1;
                 (told.items, told.is_end) = (items, is_end);
@@ -130,12 +145,30 @@ impl Ingest {
     }
 }
 
+/// The memory of a link or of a kept message beside its texts and bytes, roughly.
+const LINK: usize = 64;
+
+impl Ingest {
+    /// The number of bytes that are kept for all senders.
+    fn kept(&self) -> usize {
+        self.senders.values().map(Sender::kept).sum()
+    }
+}
+
 impl Sender {
-    fn items(&mut self, entries: Vec<Entry>) -> Result<Vec<Item>, String> {
-        entries.into_iter().map(|entry| self.item(entry)).collect()
+    /// The number of bytes that are kept.
+    fn kept(&self) -> usize {
+        let links: usize = self.links.iter().map(|link| link.port.len() + link.ros_type.len() + LINK).sum();
+        links + self.known.iter().map(|((_, topic), bytes)| topic.len() + bytes.len() + LINK).sum::<usize>()
     }
 
-    fn item(&mut self, entry: Entry) -> Result<Item, String> {
+    /// The items of a batch, of which at most `room` more bytes are kept.
+    fn items(&mut self, entries: Vec<Entry>, mut room: usize) -> Result<Vec<Item>, String> {
+        let mut left = MAX_RESTORED;
+        entries.into_iter().map(|entry| self.item(entry, &mut left, &mut room)).collect()
+    }
+
+    fn item(&mut self, entry: Entry, left: &mut usize, room: &mut usize) -> Result<Item, String> {
         let link = self.links.get(entry.link as usize).cloned();
         let link = link.ok_or_else(|| format!("it has no link {}", entry.link))?;
         let text = |error: &dyn std::fmt::Display| format!("a message on `{}`: {error}", entry.topic);
@@ -156,7 +189,11 @@ impl Sender {
         if entry.form == Form::Whole {
             return Ok(Item::Message { link, header, bytes: entry.bytes });
         }
-        let bytes = message(known, &entry.bytes).map_err(|error| text(&error))?;
+        let before = self.known.get(&key).map_or(0, |known| known.len() + key.1.len() + LINK);
+        let bytes = message(known, &entry.bytes, MAX_SIZE.min(*left)).map_err(|error| text(&error))?;
+        *left -= bytes.len();
+        let after = bytes.len() + key.1.len() + LINK;
+        *room = (*room + before).checked_sub(after).ok_or_else(|| text(&"the senders have too many large messages"))?;
         self.known.insert(key, bytes.clone());
         Ok(Item::Message { link, header, bytes })
     }

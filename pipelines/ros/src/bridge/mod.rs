@@ -29,6 +29,7 @@
 
 mod absent_senders;
 mod certificates;
+mod channel_numbers;
 mod clock;
 mod connection_errors;
 mod difference;

@@ -2,6 +2,7 @@
 
 use super::absent_senders::AbsentSenders;
 use super::certificates::Certificates;
+use super::channel_numbers::ChannelNumbers;
 use super::clock::Clock;
 use super::connection_errors::take_refusals;
 use super::ingest::{Ingest, Item, Taken};
@@ -20,7 +21,7 @@ use gridweave_runtime::stage::{
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeSet, VecDeque};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
@@ -171,8 +172,7 @@ pub(super) struct BridgeSource {
     listen_text: String,
     /// The reasons of refused connections that were logged.
     refusals: BTreeSet<String>,
-    /// The local numbers of channels, by port, sender, number at the sender, and topic.
-    channels: BTreeMap<(usize, u64, u32, String), u32>,
+    channels: ChannelNumbers,
     _token: LivelinessToken,
     _queryable: Queryable<()>,
     _session: Session,
@@ -209,7 +209,7 @@ impl BridgeSource {
             end_after: parameters.end_after,
             listen_text: network.listen_text(),
             refusals: BTreeSet::new(),
-            channels: BTreeMap::new(),
+            channels: ChannelNumbers::default(),
             _token: token,
             _queryable: queryable,
             _session: session,
@@ -308,20 +308,23 @@ impl BridgeSource {
         match item {
             Item::Channel { link, number, channel } => {
                 let Some((index, port)) = output.of(&link) else { return Ok(()) };
-                let here = self.number(index, sender, number, "");
-                port.out.announce(here, &channel)
+                match self.channels.describe((index, sender, number, String::new()), &channel) {
+                    Some(here) => port.out.announce(here, &channel)?,
+                    None => warn(output, format!("a channel on `{}` was left out: {TOO_MANY}", channel.topic)),
+                }
+                Ok(())
             }
             Item::Message { link, header, bytes } => {
                 let Some((index, port)) = output.of(&link) else { return Ok(()) };
                 output.set_log_time(header.log_time);
                 let topic = header.topic.as_str();
-                let (channel, is_announced) = match header.channel {
-                    // Results of stages have no channel.
-                    0 => {
-                        let is_announced = self.channels.contains_key(&(index, sender, 0, topic.to_owned()));
-                        (self.number(index, sender, 0, topic), is_announced)
-                    }
-                    number => (self.number(index, sender, number, ""), true),
+                // Results of stages have no channel.
+                let of = if header.channel == 0 { topic } else { "" };
+                let key = (index, sender, header.channel, of.to_owned());
+                let is_announced = header.channel != 0 || self.channels.has(&key);
+                let Some(channel) = self.channels.number(key) else {
+                    output.warn(format!("messages were left out: {TOO_MANY}"));
+                    return Ok(());
                 };
                 if !is_announced {
                     port.out.announce(channel, &channel_of(topic, &link.ros_type, ""))?;
@@ -333,13 +336,9 @@ impl BridgeSource {
             }
         }
     }
-
-    /// The local number of a sender's channel, which it keeps when it is announced again.
-    fn number(&mut self, port: usize, sender: u64, number: u32, topic: &str) -> u32 {
-        let next = u32::try_from(self.channels.len()).unwrap_or(u32::MAX - 1) + 1;
-        *self.channels.entry((port, sender, number, topic.to_owned())).or_insert(next)
-    }
 }
+
+const TOO_MANY: &str = "the senders have too many channels";
 
 /// The channel of the results of a stage. `definition` is that of their type, if it is not a built-in one.
 pub(super) fn channel_of(topic: &str, ros_type: &str, definition: &str) -> Channel {

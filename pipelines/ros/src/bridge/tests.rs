@@ -1,9 +1,10 @@
 //! An outbox and an ingest with a network between them that loses, repeats and delays.
 
 use super::clock::Clock;
+use super::difference::difference;
 use super::ingest::{Ingest, Item, Taken};
 use super::outbox::{Limits, Outbox};
-use super::wire::{Answer, Link, Outcome};
+use super::wire::{Answer, Batch, Entry, Form, Link, Outcome, to_bytes};
 use super::{sink, source};
 use gridweave_runtime::message::{FixedText, LogTime, Message, MessageFlags, MessageHeader};
 use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage};
@@ -60,6 +61,56 @@ fn carry(outbox: &mut Outbox, ingest: &mut Ingest, offset: i64) -> Taken {
         all.clock = taken.clock.or(all.clock);
     }
     all
+}
+
+/// A batch of a forged sender.
+fn forged(session: u64, number: u64, links: Vec<Link>, entries: Vec<Entry>) -> Vec<u8> {
+    let batch = Batch {
+        sender: "forged".into(),
+        session,
+        handshake: 1,
+        number,
+        receiver: if number == 0 { 0 } else { 1 },
+        clock_offset: 0,
+        dropped: 0,
+        is_end: false,
+        links,
+        entries,
+    };
+    to_bytes(&batch).unwrap()
+}
+
+#[test]
+fn what_a_few_bytes_expand_to_is_limited_for_a_batch_and_for_all_senders() {
+    const LARGE: usize = 100 << 20;
+    let mut ingest = Ingest::new(1, SECOND);
+    let large = difference(&[], &vec![0; LARGE]).unwrap();
+    let entry = |topic: &str| Entry::new(MAPS as u32, &header(topic, 1), Form::Beginning, large.clone());
+    let outcome = |ingest: &mut Ingest, bytes: &[u8]| {
+        let (taken, answer) = ingest.take(bytes);
+        (answer.outcome, taken.items.len(), taken.wrong.unwrap_or_default())
+    };
+    let handshake = |session| forged(session, 0, links(), Vec::new());
+    assert_eq!(outcome(&mut ingest, &handshake(1)).0, Outcome::Taken);
+    // A batch in which each of a thousand entries expands to a large message.
+    let many = forged(1, 1, Vec::new(), (0..1000).map(|number| entry(&format!("/{number}"))).collect());
+    let (outcome_of_many, items, wrong) = outcome(&mut ingest, &many);
+    assert_eq!((outcome_of_many, items), (Outcome::Unreadable, 0));
+    assert!(wrong.contains("expands to"), "{wrong}");
+    // Batches of which each has one, kept for the next difference.
+    let mut taken = 0;
+    for session in 2..12 {
+        assert_eq!(outcome(&mut ingest, &handshake(session)).0, Outcome::Taken);
+        let (outcome, _, wrong) = outcome(&mut ingest, &forged(session, 1, Vec::new(), vec![entry("/map")]));
+        taken += usize::from(outcome == Outcome::Taken);
+        assert!(outcome == Outcome::Taken || wrong.contains("too many large messages"), "{wrong}");
+    }
+    assert_eq!(taken, 5, "512 MB of them");
+    // Senders without end, or with links without end.
+    let full = (20..2000).filter(|session| outcome(&mut ingest, &handshake(*session)).0 != Outcome::Taken).count();
+    assert!(full > 900, "{full}");
+    let links = vec![Link::default(); 100_000];
+    assert_eq!(outcome(&mut Ingest::new(1, SECOND), &forged(1, 0, links, Vec::new())).0, Outcome::Unreadable);
 }
 
 #[test]

@@ -3,8 +3,10 @@
 use super::difference;
 use gridweave_runtime::message::{FixedText, LogTime, MessageHeader};
 use gridweave_runtime::ros::{decode, encode};
-use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
+use serde::de::{DeserializeOwned, Error as _, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+use std::fmt;
+use std::marker::PhantomData;
 
 /// The version of the protocol. Ends of different versions report an error, and transport nothing.
 pub(super) const VERSION: u32 = 1;
@@ -29,9 +31,40 @@ pub(super) struct Batch {
     /// Whether this is the end of the stream.
     pub(super) is_end: bool,
     /// The links of the sender, in a handshake.
+    #[serde(deserialize_with = "limited")]
     pub(super) links: Vec<Link>,
     /// The messages and channels.
+    #[serde(deserialize_with = "limited")]
     pub(super) entries: Vec<Entry>,
+}
+
+/// The maximum number of links, and of entries, of a batch. Each takes more memory than bytes in a batch.
+const MAX_ELEMENTS: usize = 1 << 16;
+
+/// Deserialises a sequence of at most [`MAX_ELEMENTS`].
+fn limited<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<Vec<T>, D::Error> {
+    struct Limited<T>(PhantomData<T>);
+
+    impl<'de, T: Deserialize<'de>> Visitor<'de> for Limited<T> {
+        type Value = Vec<T>;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            write!(f, "a sequence of at most {MAX_ELEMENTS} elements")
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, mut sequence: A) -> Result<Vec<T>, A::Error> {
+            let mut elements = Vec::new();
+            while let Some(element) = sequence.next_element()? {
+                if elements.len() == MAX_ELEMENTS {
+                    return Err(A::Error::custom(format!("it has more than {MAX_ELEMENTS} elements")));
+                }
+                elements.push(element);
+            }
+            Ok(elements)
+        }
+    }
+
+    deserializer.deserialize_seq(Limited(PhantomData))
 }
 
 /// A link of a bridge.
@@ -150,7 +183,7 @@ pub(super) fn from_bytes<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String>
     if version != VERSION {
         return Err(format!("it has version {version} of the bridge protocol, and this end has version {VERSION}"));
     }
-    let plain = difference::message(&[], packed).map_err(|error| error.to_string())?;
+    let plain = difference::message(&[], packed, difference::MAX_SIZE).map_err(|error| error.to_string())?;
     decode(&plain).map_err(|error| error.to_string())
 }
 

@@ -15,6 +15,7 @@ use crate::interrupt::stop_on_interrupt;
 use crate::job::progress::Gauge;
 use crate::shipped;
 use crate::status::{BadUse, Status};
+use crate::temporary;
 use crate::terminal::{print, print_line, width};
 use anyhow::{Context, Result, bail};
 use cases::Case;
@@ -76,7 +77,7 @@ pub(crate) struct CompareArgs {
 /// Runs the pipelines and prints the results.
 pub(crate) fn compare(args: &CompareArgs, registry: &Registry) -> Result<Status> {
     let pipelines = names(&args.pipelines)?;
-    let folder = tempfile::tempdir().context("cannot make a folder for the outputs of the runs")?;
+    let folder = temporary::folder("the outputs of the runs")?;
     let cases = cases::of(&args.inputs, args.unrelated, folder.path(), registry)?;
     for pipeline in &args.pipelines {
         check(pipeline, &cases[0].log, registry)?;

@@ -4,6 +4,7 @@ use super::case_file::Case;
 use super::recording::Recording;
 use super::routes::{InputStream, input_streams};
 use super::{sink, source};
+use crate::temporary;
 use anyhow::{Context, Result, bail};
 use gridweave_logs::reader::LogFile;
 use gridweave_runtime::engine::{self, EngineKind, Observer};
@@ -12,7 +13,6 @@ use gridweave_runtime::stage::StageKind;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tempfile::TempDir;
 
 /// Names of the source and the sink, in capital letters, which the name of the tested stage cannot have.
 const SOURCE: &str = "INPUT";
@@ -34,7 +34,7 @@ pub(super) fn run_case(case: &Case, observer: &dyn Observer) -> Result<Recording
     if !has_input && (!case.inputs.is_empty() || reads_file) {
         bail!("there is no {}", case.input.display());
     }
-    let folder = TempDir::new().context("cannot make a folder for the output of a case")?;
+    let folder = temporary::folder("the output of a case")?;
     let output = folder.path().join("output.mcap");
     let files = [(INPUT, text_of(&case.input)?), (OUTPUT, text_of(&output)?), (CASE, text_of(&case.folder)?)];
     let mut recording = run_stage(case, &files, observer)?;

@@ -5,7 +5,7 @@ use super::running::{RunChoice, Running, find_run};
 use crate::interrupt::stop_on_interrupt;
 use crate::status::{BadUse, Status};
 use crate::table::Table;
-use crate::terminal::{eprint_line, print, print_line, width};
+use crate::terminal::{eprint_line, print, print_line, print_on_cleared_terminal, width};
 use anyhow::Result;
 use clap::Args;
 use gridweave_runtime::engine::{memory_of_process, watch_stages};
@@ -38,8 +38,6 @@ pub(crate) struct TopArgs {
 
 /// Interval at which interrupts are checked.
 const LOOK_INTERVAL: Duration = Duration::from_millis(20);
-/// Escape sequence: move to the upper left corner, and clear the screen.
-const CLEAR: &str = "\x1b[H\x1b[J";
 
 /// Shows the stages until the run ends or the user interrupts it.
 pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
@@ -65,11 +63,8 @@ pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
         let stages = rates(&running.pipeline, &before, &now, since.elapsed().as_secs_f64());
         let is_read = match args.json {
             true => print_line(to_json(&running, &stages, &others))?,
-            false => print(format_args!(
-                "{}{}",
-                if is_redrawn { CLEAR } else { "" },
-                to_text(&running, &stages, &others, is_redrawn)
-            ))?,
+            false if is_redrawn => print_on_cleared_terminal(to_text(&running, &stages, &others, is_redrawn))?,
+            false => print(to_text(&running, &stages, &others, is_redrawn))?,
         };
         if is_over {
             eprint_line("the run has ended");

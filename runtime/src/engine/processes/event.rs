@@ -1,6 +1,7 @@
 //! The output of a process, as events for the supervisor.
 
 use super::protocol::ProcessReport;
+use crate::terminal_text::escape_all_but_styles;
 use std::io::{BufRead, BufReader};
 use std::process::ChildStdout;
 use std::sync::mpsc::Sender;
@@ -27,7 +28,7 @@ pub(super) fn read_reports(process: usize, stdout: ChildStdout, events: &Sender<
         let Ok(line) = line else { break };
         let event = match serde_json::from_str(&line) {
             Ok(report) => Event::Report { process, report },
-            Err(_) => Event::Printed { line },
+            Err(_) => Event::Printed { line: escape_all_but_styles(&line).into_owned() },
         };
         let _ = events.send(event);
     }

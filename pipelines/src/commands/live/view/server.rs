@@ -4,19 +4,21 @@
 //! that. So a slow browser gets fewer changes, and does not delay the others.
 
 use anyhow::{Result, anyhow};
+use gridweave_logs::browsers::{BrowserServer, Connection};
 use std::io::{self, Write};
 use std::net::{IpAddr, SocketAddr};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread;
 use std::time::{Duration, Instant};
-use tiny_http::{Header, Request, Response, Server};
 
 /// Without changes a browser is sent an empty line at this interval, which detects that it has gone.
 const HEARTBEAT: Duration = Duration::from_secs(5);
 
+/// The maximum number of connections. A browser opens up to six.
+const MAX_CONNECTIONS: usize = 64;
+
 /// Server of one page.
 pub(super) struct PageServer {
-    address: SocketAddr,
+    server: BrowserServer,
     shared: Arc<Shared>,
 }
 
@@ -47,23 +49,17 @@ impl PageServer {
         let failed = |error: &dyn std::fmt::Display| {
             anyhow!("cannot serve the page on {address}: {error}; choose another address with --address HOST:PORT")
         };
-        let server = Server::http(address).map_err(|error| failed(&error))?;
-        let address = server.server_addr().to_ip().ok_or_else(|| failed(&"it is not an address of this machine"))?;
         let shared = Arc::new(Shared { page, latest: Mutex::default(), changed: Condvar::new() });
         let serving = Arc::clone(&shared);
-        thread::spawn(move || {
-            for request in server.incoming_requests() {
-                let shared = Arc::clone(&serving);
-                // An error of one browser does not affect the others.
-                thread::spawn(move || drop(shared.answer(request, address)));
-            }
-        });
-        Ok(Self { address, shared })
+        // An error of one browser does not affect the others.
+        let answer = move |browser| drop(serving.answer(browser));
+        let server = BrowserServer::start(address, MAX_CONNECTIONS, answer).map_err(|error| failed(&error))?;
+        Ok(Self { server, shared })
     }
 
     /// The address of the page.
     pub(super) fn address(&self) -> SocketAddr {
-        self.address
+        self.server.address()
     }
 
     /// Whether a browser is connected.
@@ -104,23 +100,19 @@ impl Shared {
         self.latest.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn answer(&self, request: Request, address: SocketAddr) -> io::Result<()> {
+    fn answer(&self, mut browser: Connection) -> io::Result<()> {
+        const TEXT: &str = "text/plain; charset=utf-8";
+        let Some(request) = browser.request()? else { return Ok(()) };
+        let address = browser.local_address()?;
         // Guards against DNS rebinding: a foreign page must not read a server that is bound to this machine only.
-        if !is_own_host(&request, address) {
-            return request.respond(Response::from_string("wrong host\n").with_status_code(403));
+        if !request.host.is_none_or(|host| is_own_name(&host, address)) {
+            return browser.respond("403 Forbidden", TEXT, "wrong host\n");
         }
-        match request.url() {
-            "/" => {
-                let mut response = Response::from_string(self.page.as_str());
-                for (name, value) in [("Content-Type", "text/html; charset=utf-8"), ("Cache-Control", "no-store")] {
-                    if let Ok(header) = Header::from_bytes(name, value) {
-                        response.add_header(header);
-                    }
-                }
-                request.respond(response)
-            }
-            "/live" => self.send_changes(&mut request.into_writer()),
-            _ => request.respond(Response::from_string("not found: only / is served\n").with_status_code(404)),
+        match (request.method.as_str(), request.path.as_str()) {
+            ("GET", "/") => browser.respond("200 OK", "text/html; charset=utf-8", &self.page),
+            ("GET", "/live") => self.send_changes(&mut browser),
+            ("GET", _) => browser.respond("404 Not Found", TEXT, "not found: only / is served\n"),
+            _ => browser.respond("405 Method Not Allowed", TEXT, "only GET is served\n"),
         }
     }
 
@@ -166,11 +158,6 @@ impl Shared {
 }
 
 /// Whether the host of a request is an address or a name of this machine.
-fn is_own_host(request: &Request, address: SocketAddr) -> bool {
-    let host = request.headers().iter().find(|header| header.field.equiv("Host"));
-    host.is_none_or(|host| is_own_name(host.value.as_str(), address))
-}
-
 fn is_own_name(host: &str, address: SocketAddr) -> bool {
     let suffix = format!(":{}", address.port());
     let name = host.strip_suffix(suffix.as_str()).unwrap_or(host);
@@ -187,13 +174,14 @@ mod tests {
     fn ask(server: &PageServer, path: &str, host: &str) -> BufReader<TcpStream> {
         let mut stream = TcpStream::connect(server.address()).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
-        write!(stream, "GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
+        let _ = write!(stream, "GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n");
         BufReader::new(stream)
     }
 
     fn answer(server: &PageServer, path: &str, host: &str) -> String {
         let mut text = String::new();
-        ask(server, path, host).read_to_string(&mut text).unwrap();
+        // A refused connection may be closed before the request was read.
+        let _ = ask(server, path, host).read_to_string(&mut text);
         text
     }
 
@@ -250,6 +238,40 @@ mod tests {
         }
         server.end(Duration::ZERO);
         assert_eq!(line(&mut events), "event: end");
+    }
+
+    #[test]
+    fn a_body_of_any_claimed_length_is_not_read() {
+        let server = server();
+        for host in ["localhost", "evil.example"] {
+            let mut stream = TcpStream::connect(server.address()).unwrap();
+            stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+            write!(stream, "GET / HTTP/1.1\r\nHost: {host}\r\nContent-Length: 99999999999999\r\n\r\n").unwrap();
+            let mut text = String::new();
+            stream.read_to_string(&mut text).unwrap();
+            assert_eq!(text.starts_with("HTTP/1.1 200"), host == "localhost", "{text}");
+        }
+        let mut long = TcpStream::connect(server.address()).unwrap();
+        long.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+        let header = format!("X: {}\r\n", "x".repeat(1000));
+        write!(long, "GET / HTTP/1.1\r\n{}", header.repeat(30)).unwrap();
+        let mut text = String::new();
+        // The rest of what was sent may be refused.
+        let _ = long.read_to_string(&mut text);
+        assert!(text.is_empty() || text.starts_with("HTTP/1.1 400"), "{text}");
+        assert!(answer(&server, "/", "localhost").ends_with("<p>page</p>"));
+    }
+
+    #[test]
+    fn connections_beyond_a_limit_are_refused_until_others_have_gone() {
+        let server = server();
+        let half_open: Vec<TcpStream> = (0..200).map(|_| TcpStream::connect(server.address()).unwrap()).collect();
+        assert!(!answer(&server, "/", "localhost").contains("page"));
+        drop(half_open);
+        let deadline = Instant::now() + Duration::from_secs(60);
+        while !answer(&server, "/", "localhost").ends_with("<p>page</p>") {
+            assert!(Instant::now() < deadline, "the connections have gone");
+        }
     }
 
     #[test]

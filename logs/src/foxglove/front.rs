@@ -1,0 +1,137 @@
+//! The front of the Foxglove server: it lets in a limited number of clients, and no pages of foreign sites.
+//!
+//! A browser lets any page open a WebSocket to this machine, so a server that does not check the site of the page shows the run to
+//! each page that the user visits. The server of the Foxglove SDK checks nothing; so it listens on an address of this machine that a
+//! page cannot guess, and clients are relayed to it once they have been checked.
+
+use crate::browsers::{BrowserServer, Connection};
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+
+/// The maximum number of clients. The server queues messages for each that does not read.
+const MAX_CLIENTS: usize = 32;
+/// The site of the app.
+const APP: &str = "foxglove.dev";
+
+/// Starts the front on `host` and `port`, for the server at `inner`. Pages of `sites` are let in, too.
+///
+/// # Errors
+/// The address cannot be bound.
+pub(super) fn start(host: &str, port: u16, inner: SocketAddr, sites: Vec<String>) -> io::Result<BrowserServer> {
+    // A name of IPv6 is in brackets in a URL.
+    let host = host.trim_start_matches('[').trim_end_matches(']');
+    BrowserServer::start((host, port), MAX_CLIENTS, move |client| {
+        // A client that has gone is no failure.
+        let _ = let_in(client, inner, &sites);
+    })
+}
+
+/// A random address of this machine, of the 16 million that there are.
+pub(super) fn random_address() -> io::Result<Ipv4Addr> {
+    let mut bytes = [0; 3];
+    rustix::rand::getrandom(&mut bytes, rustix::rand::GetRandomFlags::empty())?;
+    let [second, third, fourth] = bytes;
+    // Neither the address of the network nor that for all.
+    Ok(Ipv4Addr::new(127, second, third, fourth.clamp(1, 254)))
+}
+
+fn let_in(mut client: Connection, inner: SocketAddr, sites: &[String]) -> io::Result<()> {
+    let Some(request) = client.request()? else { return Ok(()) };
+    let own = client.local_address()?.ip();
+    match request.origin {
+        Some(origin) if !is_trusted(&origin, own, sites) => {
+            tracing::warn!(
+                "a page of {origin} was refused: `origins` of `foxglove_sink` lists the sites that may connect"
+            );
+            client.respond("403 Forbidden", "text/plain; charset=utf-8", "wrong origin\n")
+        }
+        _ => client.relay(inner, &request.bytes),
+    }
+}
+
+/// Whether a page of a site may connect to this machine at `own`: one of this machine, of the app, or of the listed `sites`; or an
+/// app that is no page of a site.
+fn is_trusted(origin: &str, own: IpAddr, sites: &[String]) -> bool {
+    if sites.iter().any(|site| site.trim_end_matches('/').eq_ignore_ascii_case(origin)) {
+        return true;
+    }
+    // A page that hides its site has the origin `null`.
+    let Some((scheme, rest)) = origin.split_once("://") else { return false };
+    if !["http", "https"].iter().any(|web| scheme.eq_ignore_ascii_case(web)) {
+        return true;
+    }
+    let host = match rest.strip_prefix('[') {
+        Some(rest) => rest.split(']').next().unwrap_or_default(),
+        None => rest.split(':').next().unwrap_or_default(),
+    };
+    let host = host.to_ascii_lowercase();
+    let is_app = host == APP || host.strip_suffix(APP).is_some_and(|host| host.ends_with('.'));
+    let is_own = host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback() || address == own);
+    host == "localhost" || is_own || is_app && scheme.eq_ignore_ascii_case("https")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{Read, Write};
+    use std::net::{TcpListener, TcpStream};
+    use std::time::Duration;
+
+    #[test]
+    fn pages_of_this_machine_and_of_the_app_are_trusted_and_others_are_not() {
+        let own = IpAddr::from([192, 168, 1, 5]);
+        let sites = ["https://viewer.example/".to_owned()];
+        let trusted = [
+            "http://localhost:8080",
+            "http://127.0.0.1",
+            "http://[::1]:80",
+            "http://192.168.1.5:9000",
+            "https://app.foxglove.dev",
+            "https://viewer.example",
+            "file://",
+        ];
+        assert!(trusted.iter().all(|origin| is_trusted(origin, own, &sites)));
+        let foreign = [
+            "https://evil.example",
+            "null",
+            "",
+            "http://192.168.1.6",
+            "https://foxglove.dev.evil.example",
+            "https://evilfoxglove.dev",
+            "http://localhost.evil.example",
+            "http://app.foxglove.dev",
+        ];
+        assert!(foreign.iter().all(|origin| !is_trusted(origin, own, &sites)));
+    }
+
+    /// What a client is answered that sends a request with an origin.
+    fn answer(address: SocketAddr, origin: &str) -> String {
+        let mut stream = TcpStream::connect(address).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+        write!(stream, "GET / HTTP/1.1\r\nHost: a\r\nOrigin: {origin}\r\nUpgrade: websocket\r\n\r\n").unwrap();
+        let mut text = String::new();
+        stream.read_to_string(&mut text).unwrap();
+        text
+    }
+
+    #[test]
+    fn a_trusted_client_is_relayed_and_a_foreign_page_is_not() {
+        let inner = TcpListener::bind("127.0.0.1:0").unwrap();
+        let front = start("127.0.0.1", 0, inner.local_addr().unwrap(), Vec::new()).unwrap();
+        let server = std::thread::spawn(move || {
+            let (mut client, _) = inner.accept().unwrap();
+            let mut request = [0; 1024];
+            let length = client.read(&mut request).unwrap();
+            client.write_all(b"relayed").unwrap();
+            String::from_utf8_lossy(&request[..length]).into_owned()
+        });
+        assert!(answer(front.address(), "https://evil.example").starts_with("HTTP/1.1 403"));
+        assert_eq!(answer(front.address(), "http://localhost"), "relayed");
+        assert!(server.join().unwrap().contains("Origin: http://localhost"));
+        let address = front.address();
+        drop(front);
+        let is_closed = || TcpStream::connect(address).is_err();
+        assert!((0..1_000_000).any(|_| is_closed()), "the port is closed");
+        assert_ne!(random_address().unwrap(), random_address().unwrap());
+    }
+}
