@@ -1,0 +1,1 @@
+//! The whole command among real nodes of ROS 2.
