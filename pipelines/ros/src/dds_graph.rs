@@ -65,10 +65,10 @@ impl Graph {
         std::mem::take(&mut *lock(&self.problems))
     }
 
-    /// Takes up what a participant says of its nodes. Identifiers have so many bytes.
-    pub(crate) fn note_names(&self, message: &[u8], id_size: usize) {
+    /// Takes up what a participant says of its nodes.
+    pub(crate) fn note_names(&self, message: &[u8]) {
         let mut seen = lock(&self.seen);
-        for (name, endpoints) in nodes(message, id_size).unwrap_or_default() {
+        for (name, endpoints) in nodes(message).unwrap_or_default() {
             seen.names.extend(endpoints.into_iter().map(|endpoint| (endpoint, name.clone())));
         }
         drop(seen);
@@ -235,7 +235,7 @@ mod tests {
         assert!(told.try_recv().is_err(), "its name is waited for");
         let name = NodeName { namespace: "/robot2".into(), name: "slam_toolbox".into() };
         let message = super::super::dds_names::message(Guid::default(), &name, &[endpoint(3, "").guid]);
-        graph.note_names(&message, 16);
+        graph.note_names(&message);
         let (entity, is_there) = told.try_recv().unwrap();
         assert_eq!((entity.full_node_name().as_str(), is_there), ("/robot2/slam_toolbox", true));
         graph.endpoint(&endpoint(3, "rt/robot2/map"), false);
@@ -249,14 +249,8 @@ mod tests {
         let graph = Graph::new(0);
         let (here, there) = (endpoint(1, "rt/map"), endpoint(2, "rt/map"));
         let here = EndpointData { policies: Policies::new(false, false, Some(5)), ..here };
-        graph.note_names(
-            &super::super::dds_names::message(
-                Guid::default(),
-                &NodeName { namespace: "/".into(), name: "rviz".into() },
-                &[there.guid],
-            ),
-            16,
-        );
+        let name = NodeName { namespace: "/".into(), name: "rviz".into() };
+        graph.note_names(&super::super::dds_names::message(Guid::default(), &name, &[there.guid]));
         for _ in 0..2 {
             graph.mismatch(&Mismatch { here: here.clone(), there: there.clone(), policies: vec!["reliability"] });
             graph.tick();

@@ -2,7 +2,7 @@
 //! is among the user data of its endpoints.
 
 use super::dds_graph::{Graph, NAMES_TOPIC, TOPIC_PREFIX};
-use super::dds_names::{self, ID_SIZE, NodeName, OLD_ID_SIZE, TYPE, TYPE_HASH};
+use super::dds_names::{self, NodeName, TYPE, TYPE_HASH};
 use super::key_expression::{NO_HASH, Topic, type_in_keys};
 use super::liveliness::Entity;
 use super::qos::Qos;
@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// A node with a participant of its own.
 pub(crate) struct DdsNode {
     own: Arc<OwnNode>,
-    _names: [Reading; 2],
+    _names: Reading,
     graph: Arc<Graph>,
     participant: Participant,
 }
@@ -43,21 +43,17 @@ impl DdsNode {
             .map_err(|error| StageError::new(doing, error).with_help("`middleware = \"zenoh\"` does without DDS"))?;
         let graph = Graph::new(domain);
         participant.watch(Box::new(Arc::clone(&graph)));
-        let latched = Policies::new(true, true, Some(1));
-        let names = |type_hash: Option<&str>| endpoint(NAMES_TOPIC, TYPE, type_hash, latched.clone());
-        let read = |type_hash, id_size| {
-            let graph = Arc::clone(&graph);
-            participant.read_from(names(type_hash), move |sample| graph.note_names(&sample.payload, id_size))
-        };
-        let readings = [read(Some(TYPE_HASH), ID_SIZE), read(None, OLD_ID_SIZE)];
+        let names = endpoint(NAMES_TOPIC, TYPE, Some(TYPE_HASH), Policies::new(true, true, Some(1)));
+        let of_others = Arc::clone(&graph);
+        let reading = participant.read_from(names.clone(), false, move |sample| of_others.note_names(&sample.payload));
         let own = OwnNode {
             participant: Guid { prefix: participant.prefix(), entity: EntityId::PARTICIPANT },
             name: NodeName { namespace: "/".to_owned(), name: node.to_owned() },
             endpoints: Mutex::default(),
-            names: participant.write_to(names(Some(TYPE_HASH))),
+            names: participant.write_to(names),
         };
         own.change(|_| {});
-        Ok(Self { own: Arc::new(own), _names: readings, graph, participant })
+        Ok(Self { own: Arc::new(own), _names: reading, graph, participant })
     }
 
     /// The name of its participant.
@@ -89,7 +85,7 @@ impl DdsNode {
         qos: Qos,
         call: impl Fn(Sample) + Send + Sync + 'static,
     ) -> DdsSubscriber {
-        let reading = self.participant.read_from(of_topic(topic, qos), call);
+        let reading = self.participant.read_from(of_topic(topic, qos), true, call);
         let of_node = OfNode::new(&self.own, reading.guid());
         DdsSubscriber { _reading: reading, _of_node: of_node }
     }

@@ -7,7 +7,7 @@ use super::message::Message;
 use super::network::{Network, Reach};
 use super::outgoing::{Content, Outgoing};
 use super::reader::Sample;
-use super::state::{Event, Mismatch, State};
+use super::state::{Event, Mismatch, Role, State};
 use std::collections::BTreeMap;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddrV4};
@@ -129,15 +129,22 @@ impl Participant {
 
     /// Makes a writer. Of `data` all but the identifier counts.
     pub(crate) fn write_to(&self, data: EndpointData) -> Writing {
-        let guid = self.shared.change(|state, now| state.create(data, true, now));
+        let guid = self.shared.change(|state, now| state.create(data, Role::Writer, now));
         Writing { shared: Arc::clone(&self.shared), guid }
     }
 
-    /// Makes a reader, and calls `call` with what it hears.
-    pub(crate) fn read_from(&self, data: EndpointData, call: impl Fn(Sample) + Send + Sync + 'static) -> Reading {
+    /// Makes a reader, and calls `call` with what it hears: all that is published of its topic and type or, if it
+    /// `hears_one_definition`, what has the same definition of the type. Of `data` all but the identifier counts.
+    pub(crate) fn read_from(
+        &self,
+        data: EndpointData,
+        hears_one_definition: bool,
+        call: impl Fn(Sample) + Send + Sync + 'static,
+    ) -> Reading {
         // What comes at once waits until it is known for whom.
         let mut readers = lock(&self.shared.readers);
-        let guid = self.shared.change(|state, now| state.create(data, false, now));
+        let role = if hears_one_definition { Role::ReaderOfOneDefinition } else { Role::Reader };
+        let guid = self.shared.change(|state, now| state.create(data, role, now));
         readers.insert(guid.entity, Arc::new(call));
         Reading { shared: Arc::clone(&self.shared), guid }
     }

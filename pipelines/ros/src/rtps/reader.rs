@@ -45,6 +45,8 @@ pub(crate) struct Reader {
 struct MatchedWriter {
     addresses: Vec<SocketAddrV4>,
     is_reliable: bool,
+    /// Whether its samples are passed on.
+    is_heard: bool,
     /// All before this one have come, or never will.
     next: i64,
     /// Later ones that have come; `None` for those that do not come.
@@ -63,7 +65,13 @@ impl Reader {
     }
 
     /// Takes up a writer, or where it is now.
-    pub(crate) fn add_writer(&mut self, guid: Guid, addresses: Vec<SocketAddrV4>, is_reliable: bool, now: Instant) {
+    pub(crate) fn add_writer(
+        &mut self,
+        guid: Guid,
+        addresses: Vec<SocketAddrV4>,
+        [is_reliable, is_heard]: [bool; 2],
+        now: Instant,
+    ) {
         if let Some(known) = self.writers.get_mut(&guid) {
             known.addresses = addresses;
             return;
@@ -72,6 +80,7 @@ impl Reader {
         let writer = MatchedWriter {
             addresses,
             is_reliable,
+            is_heard,
             next: 1,
             held: BTreeMap::new(),
             assemblies: BTreeMap::new(),
@@ -93,6 +102,12 @@ impl Reader {
     /// Takes what a writer says: gives the samples that are in their turn, and what is to be answered.
     pub(crate) fn take(&mut self, part: &Submessage<'_>) -> (Vec<Sample>, Option<Outgoing>) {
         let from = Guid { prefix: part.source, entity: part.writer };
+        let (samples, answer) = self.take_from(from, part);
+        let is_heard = self.writers.get(&from).is_some_and(|writer| writer.is_heard);
+        (if is_heard { samples } else { Vec::new() }, answer)
+    }
+
+    fn take_from(&mut self, from: Guid, part: &Submessage<'_>) -> (Vec<Sample>, Option<Outgoing>) {
         let Some(writer) = self.writers.get_mut(&from) else { return Default::default() };
         match &part.body {
             Body::Data { sequence, inline, is_little, payload, .. } => {

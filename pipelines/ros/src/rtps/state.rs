@@ -31,9 +31,19 @@ pub(crate) struct Mismatch {
     pub(crate) policies: Vec<&'static str>,
 }
 
+/// What an endpoint here does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Role {
+    Writer,
+    Reader,
+    /// A reader that hears only what has the same definition of the type.
+    ReaderOfOneDefinition,
+}
+
 /// A writer or reader here, as it is announced.
 #[derive(Debug)]
 struct Announced {
+    role: Role,
     data: EndpointData,
     /// The number of the announcement.
     sequence: i64,
@@ -85,7 +95,8 @@ impl State {
     }
 
     /// Makes a writer (or a reader) and announces it. Of `data` all but the identifier counts.
-    pub(crate) fn create(&mut self, mut data: EndpointData, is_writer: bool, now: Instant) -> Guid {
+    pub(crate) fn create(&mut self, mut data: EndpointData, role: Role, now: Instant) -> Guid {
+        let is_writer = role == Role::Writer;
         let number = self.next_number;
         self.next_number = self.next_number.wrapping_add(1).max(1);
         let entity = if is_writer { EntityId::writer(number) } else { EntityId::reader(number) };
@@ -102,7 +113,7 @@ impl State {
             }
         }
         let sequence = self.announce(is_writer, [Vec::new(), data.to_bytes()], false, now);
-        self.announced.insert(entity, Announced { data, sequence });
+        self.announced.insert(entity, Announced { role, data, sequence });
         let others: Vec<Guid> = self.endpoints.keys().copied().collect();
         for other in others {
             self.match_pair(entity, other, now);
@@ -162,7 +173,7 @@ impl State {
                 (self.writers.get_mut(&matching(entity)), self.readers.get_mut(&entity))
             {
                 self.outgoing.extend(writer.add_reader(Guid { prefix, entity }, to.clone(), [true, true], now));
-                reader.add_writer(Guid { prefix, entity: matching(entity) }, to.clone(), true, now);
+                reader.add_writer(Guid { prefix, entity: matching(entity) }, to.clone(), [true, true], now);
             }
         }
         is_new
@@ -215,17 +226,14 @@ impl State {
         }
         let of_types = [here, there].map(|endpoint| (&endpoint.type_name, endpoint.type_hash.as_ref()));
         let has_other_type = of_types[0].0 != of_types[1].0;
-        // A reader here is for one definition; one of another definition is read by another reader, if at all.
-        if !entity.is_writer() && !has_other_type && of_types[0].1 != of_types[1].1 {
-            return;
-        }
-        let has_other_hash =
-            entity.is_writer() && of_types.iter().all(|(_, hash)| hash.is_some()) && of_types[0].1 != of_types[1].1;
-        if has_other_hash {
+        let has_other_hash = of_types[0].1 != of_types[1].1;
+        if entity.is_writer() && !has_other_type && has_other_hash && of_types.iter().all(|(_, hash)| hash.is_some()) {
             // As among nodes of ROS, they are connected all the same.
             let mismatch = Mismatch { here: here.clone(), there: there.clone(), policies: Vec::new() };
             self.events.push(Event::Mismatch(Box::new(mismatch)));
         }
+        // The writer takes it for a reader, and so it is one, though it may not pass on what it gets.
+        let is_heard = announced.role != Role::ReaderOfOneDefinition || !has_other_hash;
         let (reader, writer) = if entity.is_writer() { (there, here) } else { (here, there) };
         let policies = reader.policies.mismatches(&writer.policies);
         if has_other_type || !policies.is_empty() {
@@ -240,7 +248,7 @@ impl State {
         if let Some(writer) = self.writers.get_mut(&entity) {
             self.outgoing.extend(writer.add_reader(other, to, [is_reliable, is_latched], now));
         } else if let Some(reader) = self.readers.get_mut(&entity) {
-            reader.add_writer(other, to, is_reliable, now);
+            reader.add_writer(other, to, [is_reliable, is_heard], now);
         }
     }
 
