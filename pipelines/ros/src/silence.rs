@@ -35,7 +35,7 @@ impl Silence {
             )),
             (false, _, None) if is_late => Some(format!(
                 "connected, but nobody publishes in the domain {domain}: is the ROS_DOMAIN_ID of the robots another one? Robots on Fast \
-                 DDS or Cyclone DDS are heard with `middleware = \"auto\"`"
+                 DDS or Cyclone DDS are heard with `middleware = \"auto\"`, or if they run with RMW_IMPLEMENTATION=rmw_zenoh_cpp"
             )),
             (true, has_zenoh, router) if is_late => {
                 let zenoh = match (has_zenoh, router) {

@@ -14,6 +14,10 @@ use std::time::{Duration, Instant};
 /// A writer that says nothing is asked again, in ever longer intervals from the first to the longest.
 const FIRST_QUESTION: Duration = Duration::from_millis(100);
 const LONGEST_QUESTION: Duration = Duration::from_secs(5);
+/// Fragments that do not come on are asked for after this time, and then in ever longer intervals up to the longest. The heartbeats
+/// of some writers are seconds apart.
+const STALL: Duration = Duration::from_millis(20);
+const LONGEST_STALL: Duration = Duration::from_secs(1);
 /// So many samples wait for those before them. Further ones are asked for again.
 const HELD_SAMPLES: usize = 1024;
 /// So many samples are put together at a time.
@@ -57,6 +61,8 @@ struct MatchedWriter {
     requests: u32,
     /// When it is asked what it has, as nothing was heard of it yet.
     question: Option<(Instant, Duration)>,
+    /// When missing fragments are asked for, if none come before.
+    stall: Option<(Instant, Duration)>,
 }
 
 impl Reader {
@@ -87,6 +93,7 @@ impl Reader {
             heartbeat: None,
             requests: 0,
             question: is_reliable.then_some((now, FIRST_QUESTION)),
+            stall: None,
         };
         self.writers.insert(guid, writer);
     }
@@ -100,14 +107,14 @@ impl Reader {
     }
 
     /// Takes what a writer says: gives the samples that are in their turn, and what is to be answered.
-    pub(crate) fn take(&mut self, part: &Submessage<'_>) -> (Vec<Sample>, Option<Outgoing>) {
+    pub(crate) fn take(&mut self, part: &Submessage<'_>, now: Instant) -> (Vec<Sample>, Option<Outgoing>) {
         let from = Guid { prefix: part.source, entity: part.writer };
-        let (samples, answer) = self.take_from(from, part);
+        let (samples, answer) = self.take_from(from, part, now);
         let is_heard = self.writers.get(&from).is_some_and(|writer| writer.is_heard);
         (if is_heard { samples } else { Vec::new() }, answer)
     }
 
-    fn take_from(&mut self, from: Guid, part: &Submessage<'_>) -> (Vec<Sample>, Option<Outgoing>) {
+    fn take_from(&mut self, from: Guid, part: &Submessage<'_>, now: Instant) -> (Vec<Sample>, Option<Outgoing>) {
         let Some(writer) = self.writers.get_mut(&from) else { return Default::default() };
         match &part.body {
             Body::Data { sequence, inline, is_little, payload, .. } => {
@@ -118,6 +125,7 @@ impl Reader {
             }
             Body::Fragments { sequence, first, fragment_size, sample_size, payload, .. } => {
                 let sizes = (*sample_size, *fragment_size);
+                writer.stall = writer.is_reliable.then_some((now + STALL, STALL));
                 let Some(payload) = writer.assemble(*sequence, *first, sizes, payload) else {
                     return Default::default();
                 };
@@ -142,16 +150,23 @@ impl Reader {
 
     /// When it has something to ask.
     pub(crate) fn due(&self) -> Option<Instant> {
-        self.writers.values().filter_map(|writer| writer.question).map(|(at, _)| at).min()
+        self.writers.values().flat_map(|writer| [writer.question, writer.stall]).flatten().map(|(at, _)| at).min()
     }
 
     /// The questions that are due.
     pub(crate) fn tick(&mut self, now: Instant) -> Vec<Outgoing> {
         let mut outgoing = Vec::new();
         for (guid, writer) in &mut self.writers {
-            let Some((_, interval)) = writer.question.filter(|(at, _)| *at <= now) else { continue };
-            writer.question = Some((now + interval, (interval * 2).min(LONGEST_QUESTION)));
-            outgoing.push(writer.request(self.guid, *guid, 0));
+            if let Some((_, interval)) = writer.question.filter(|(at, _)| *at <= now) {
+                writer.question = Some((now + interval, (interval * 2).min(LONGEST_QUESTION)));
+                outgoing.push(writer.ask(self.guid, *guid));
+            }
+            if let Some((_, interval)) = writer.stall.filter(|(at, _)| *at <= now) {
+                let last = writer.assemblies.keys().next_back().copied();
+                let interval = (interval * 2).min(LONGEST_STALL);
+                writer.stall = last.map(|_| (now + interval, interval));
+                outgoing.extend(last.map(|last| writer.request(self.guid, *guid, last)));
+            }
         }
         outgoing
     }
@@ -239,6 +254,16 @@ impl MatchedWriter {
         samples
     }
 
+    /// What asks a writer what it has. The specification lets it begin with the number 1; Fast DDS answers at once if it begins with 0,
+    /// and with 1 when its next heartbeat is due, after three seconds. So both are asked in turn.
+    fn ask(&mut self, own: Guid, writer: Guid) -> Outgoing {
+        self.requests = self.requests.wrapping_add(1);
+        let nothing = NumberSet::new(i64::from(self.requests % 2 == 0), []);
+        let message = Message::new(own.prefix).to(writer.prefix);
+        let message = message.acknack(own.entity, writer.entity, &nothing, self.requests, false);
+        Outgoing { to: self.addresses.clone(), content: Content::Message(message) }
+    }
+
     /// What says what has come, and asks for what is missing up to the last sample of the writer.
     fn request(&mut self, own: Guid, writer: Guid, last: i64) -> Outgoing {
         self.requests = self.requests.wrapping_add(1);
@@ -246,10 +271,9 @@ impl MatchedWriter {
         let missing = (self.next..=last).take(super::number_set::CAPACITY as usize).filter(is_missing);
         let (partly, wholly): (Vec<i64>, Vec<i64>) = missing.partition(|number| self.assemblies.contains_key(number));
         let missing = NumberSet::new(self.next, wholly);
-        let is_final = self.heartbeat.is_some();
         let (reader, from) = (own.entity, writer.entity);
         let mut message =
-            Message::new(own.prefix).to(writer.prefix).acknack(reader, from, &missing, self.requests, is_final);
+            Message::new(own.prefix).to(writer.prefix).acknack(reader, from, &missing, self.requests, true);
         for sequence in partly.into_iter().take(2) {
             let Some(assembly) = self.assemblies.get(&sequence) else { continue };
             let mut fragments = assembly.missing().peekable();

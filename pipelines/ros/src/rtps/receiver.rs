@@ -63,7 +63,7 @@ impl State {
         };
         for entity in readers {
             let Some(reader) = self.readers.get_mut(&entity) else { continue };
-            let (samples, answer): (Vec<Sample>, Option<Outgoing>) = reader.take(part);
+            let (samples, answer): (Vec<Sample>, Option<Outgoing>) = reader.take(part, now);
             self.outgoing.extend(answer);
             for sample in samples {
                 match entity {

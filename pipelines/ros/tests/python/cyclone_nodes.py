@@ -4,6 +4,7 @@ import json
 import math
 import os
 import sys
+import threading
 import time
 from dataclasses import dataclass, field
 
@@ -67,10 +68,10 @@ class TFMessage(IdlStruct, typename="tf2_msgs::msg::dds_::TFMessage_"):
     transforms: sequence[TransformStamped] = field(default_factory=list)
 
 
-RELIABLE = Policy.Reliability.Reliable(duration(seconds=1))
-LATCHED = Qos(RELIABLE, Policy.Durability.TransientLocal, Policy.History.KeepLast(1))
-VOLATILE = Qos(RELIABLE, Policy.Durability.Volatile, Policy.History.KeepLast(100))
-CDR = Qos(Policy.DataRepresentation(use_cdrv0_representation=True))
+# With the encoding of ROS.
+RELIABLE = [Policy.Reliability.Reliable(duration(seconds=1)), Policy.DataRepresentation(use_cdrv0_representation=True)]
+LATCHED = Qos(*RELIABLE, Policy.Durability.TransientLocal, Policy.History.KeepLast(1))
+VOLATILE = Qos(*RELIABLE, Policy.Durability.Volatile, Policy.History.KeepLast(100))
 
 
 def transform(parent, child, x):
@@ -79,14 +80,12 @@ def transform(parent, child, x):
 
 def tf(robot):
     """Publishes where a robot is, on /tf and /tf_static, until standard input ends."""
-    participant = DomainParticipant()
+    participant = DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
     static, moving = [
-        DataWriter(participant, Topic(participant, name, TFMessage, qos=CDR), qos=qos + CDR if hasattr(qos, "__add__") else qos)
+        DataWriter(participant, Topic(participant, name, TFMessage), qos=qos)
         for name, qos in (("rt/tf_static", LATCHED), ("rt/tf", VOLATILE))
     ]
     static.write(TFMessage([transform(f"{robot}/odom", f"{robot}/base_link", 2.0)]))
-    import threading
-
     over = threading.Event()
     threading.Thread(target=lambda: (sys.stdin.read(), over.set()), daemon=True).start()
     while not over.wait(0.05):
@@ -95,7 +94,7 @@ def tf(robot):
 
 def frames(count, longest):
     """Looks at /tf_static until the frames of so many robots are there, and prints them as JSON."""
-    participant = DomainParticipant()
+    participant = DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
     reader = DataReader(participant, Topic(participant, "rt/tf_static", TFMessage), qos=LATCHED)
     seen, end = {}, time.monotonic() + float(longest)
     while len(seen) < int(count):

@@ -3,6 +3,7 @@
 A message that is published may be bytes: rclpy sends them as they are.
 """
 
+import array
 import json
 import sys
 import time
@@ -56,8 +57,6 @@ def map_of(width, value):
     grid.info.width = grid.info.height = width
     grid.info.resolution = 0.05
     # A list would take seconds.
-    import array
-
     grid.data = array.array("b", bytes([value]) * (width * width))
     return grid
 
@@ -85,29 +84,28 @@ def view(least_known, longest):
 
     def take(grid):
         assert len(grid.data) == grid.info.width * grid.info.height
-        known = sum(cell >= 0 for cell in grid.data)
+        known = len(grid.data) - grid.data.count(-1)
         seen["map"] = {"frame": grid.header.frame_id, "width": grid.info.width, "known": known}
 
     node.create_subscription(OccupancyGrid, "/map", take, LATCHED)
     until(node, lambda: seen.get("map", {}).get("known", 0) >= int(least_known), float(longest), f"a map beyond {seen}")
-    [about] = node.get_publishers_info_by_topic("/map")
     until(node, lambda: ("gridweave_ros", "/") in node.get_node_names_and_namespaces(), float(longest), "the node's name")
     [about] = node.get_publishers_info_by_topic("/map")
     seen["publisher"] = [about.node_name, about.topic_type, str(about.topic_type_hash), about.qos_profile.durability.name]
     json.dump(seen, sys.stdout)
 
 
-def subscribe_latched_updates():
-    """Asks for updates with a durability that nobody offers, says when it knows that, and stays until standard input ends."""
+def ask_for_more():
+    """Asks for a durability that is not offered, says when it knows that, and stays until standard input ends."""
     from rclpy.event_handler import SubscriptionEventCallbacks
 
     node, told = rclpy.create_node("picky"), []
     events = SubscriptionEventCallbacks(incompatible_qos=told.append)
-    node.create_subscription(OccupancyGrid, "/odd", print, LATCHED, event_callbacks=events)
+    node.create_subscription(PoseStamped, "/odd", print, LATCHED, event_callbacks=events)
     until(node, lambda: told, 60.0, "the event of an incompatible QoS")
     print("incompatible", flush=True)
     sys.stdin.read()
 
 
 rclpy.init()
-{f.__name__: f for f in (robots, publish_map, publish_strings, view, subscribe_latched_updates)}[sys.argv[1]](*sys.argv[2:])
+{f.__name__: f for f in (robots, publish_map, publish_strings, view, ask_for_more)}[sys.argv[1]](*sys.argv[2:])
