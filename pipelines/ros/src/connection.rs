@@ -1,5 +1,8 @@
-//! The connection of a stage to the Zenoh network of ROS 2 programs.
+//! The connection of a stage to the network of ROS 2 programs.
 
+use super::dds_node::DdsNode;
+use super::discovery_range::{DiscoveryRange, static_peers};
+use super::middleware::Middlewares;
 use gridweave_runtime::stage::{ParameterError, StageError};
 use std::path::{Path, PathBuf};
 use zenoh::{Config, Session, Wait};
@@ -16,6 +19,9 @@ const DOMAIN_VARIABLE: &str = "ROS_DOMAIN_ID";
 /// The network parameters of a stage.
 #[derive(Clone, Debug)]
 pub(crate) struct Connection {
+    pub(crate) middleware: Middlewares,
+    pub(crate) discovery_range: Option<DiscoveryRange>,
+    pub(crate) static_peers: Vec<String>,
     pub(crate) domain: Option<u32>,
     pub(crate) connect: Vec<String>,
     pub(crate) listen: Vec<String>,
@@ -59,6 +65,22 @@ impl Connection {
             }),
             _ => Ok(0),
         }
+    }
+
+    /// Joins a domain on DDS.
+    ///
+    /// # Errors
+    /// The environment wants nobody to be found, or the system refuses the sockets.
+    pub(crate) fn join_dds(&self, domain: u32, node: &str) -> Result<DdsNode, StageError> {
+        let range = match self.discovery_range {
+            Some(range) => Some(range),
+            None => DiscoveryRange::of_environment()?,
+        };
+        let range = range.ok_or_else(|| {
+            StageError::new("join the DDS network", "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF")
+                .with_help("SUBNET and LOCALHOST are others; `discovery_range` in the pipeline stands in for it")
+        })?;
+        DdsNode::start(domain, node, range.reach(), &static_peers(&self.static_peers))
     }
 
     /// Opens a session.

@@ -1,6 +1,7 @@
 //! The queue of received events.
 
 use super::liveliness::Entity;
+use super::middleware::Middleware;
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -8,7 +9,7 @@ use std::time::Duration;
 /// A received event.
 pub(crate) enum Event<M> {
     /// A publisher, subscriber or node has appeared (or disappeared).
-    Entity(Entity, bool),
+    Entity(Middleware, Entity, bool),
     /// A message on the topic with the given index.
     Message { topic: usize, message: M, arrived: i64 },
 }

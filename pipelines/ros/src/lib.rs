@@ -1,5 +1,5 @@
-//! ROS 2 without ROS: stages that subscribe to the topics of robots and publish results, over [Zenoh](https://zenoh.io), with the
-//! protocol of the ROS 2 middleware `rmw_zenoh_cpp`.
+//! ROS 2 without ROS: stages that subscribe to the topics of robots and publish results, over DDS, the default middleware of ROS 2,
+//! and over [Zenoh](https://zenoh.io) with the protocol of `rmw_zenoh_cpp`.
 //!
 //! The binary `gridweave-ros` is the command `gridweave` with these additional kinds. A program with its own stages adds
 //! [`kinds`] in the same way:
@@ -10,7 +10,7 @@
 //! }
 //! ```
 //!
-//! The protocol is documented in `docs/design.md` of `rmw_zenoh`: [key expressions](key_expression) of topics, [liveliness
+//! The protocol of DDS is DDSI-RTPS. That of Zenoh is documented in `docs/design.md` of `rmw_zenoh`: [key expressions](key_expression) of topics, [liveliness
 //! tokens](liveliness) for discovery, and [attachments](attachment) of messages.
 
 #![forbid(unsafe_code)]
@@ -19,19 +19,27 @@ pub mod attachment;
 pub mod bridge;
 mod changed_part;
 mod connection;
+mod dds_graph;
+mod dds_names;
+mod dds_node;
 mod definitions;
+mod discovery_range;
 mod inbox;
 pub mod key_expression;
 pub mod liveliness;
 mod map_subscribers;
 mod map_topics;
+mod middleware;
 mod node;
 pub mod qos;
 mod robot_trees;
+mod rtps;
 mod settled_frames;
+mod silence;
 pub mod sink;
 pub mod source;
 mod source_parameters;
+mod zenoh_node;
 
 use gridweave_runtime::stage::StageKind;
 

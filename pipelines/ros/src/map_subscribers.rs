@@ -58,14 +58,20 @@ impl MapSubscribers {
         }
     }
 
-    /// Whether a map has subscribers, and every node that subscribes to it subscribes to its updates too.
+    /// Whether a map has subscribers, and every node that subscribes to it subscribes to its updates too. Nodes of a process whose
+    /// names are not known are one here, and subscribe to updates as often as to the map if each of them does.
     pub(crate) fn receives_updates(&self, map: &str) -> bool {
         let state = self.lock();
-        let subscribers = |topic: &str| state.subscribers.get(topic).into_iter().flatten();
-        let node = |entity: &Entity| (entity.session.clone(), entity.full_node_name());
-        let with_updates: BTreeSet<_> = subscribers(&updates_of(map)).map(node).collect();
-        let mut of_map = subscribers(map).peekable();
-        of_map.peek().is_some() && of_map.all(|entity| with_updates.contains(&node(entity)))
+        let counts = |topic: &str| {
+            let mut counts = BTreeMap::<_, usize>::new();
+            for entity in state.subscribers.get(topic).into_iter().flatten() {
+                *counts.entry((entity.session.clone(), entity.full_node_name())).or_default() += 1;
+            }
+            counts
+        };
+        let (of_map, of_updates) = (counts(map), counts(&updates_of(map)));
+        let receives = |node, count| of_updates.get(node).is_some_and(|updates| updates >= count);
+        !of_map.is_empty() && of_map.iter().all(|(node, count)| receives(node, count))
     }
 
     /// Waits for the next late joiner; `None` after [`end`](Self::end).
@@ -121,6 +127,10 @@ mod tests {
         subscribers.note(map("b"), true);
         assert!(!subscribers.receives_updates("/map"));
         subscribers.note(map("b"), false);
+        let second = Entity { number: 11, ..map("a") };
+        subscribers.note(second.clone(), true);
+        assert!(!subscribers.receives_updates("/map"), "there may be a second node in that process");
+        subscribers.note(second, false);
         assert!(subscribers.receives_updates("/map"));
         subscribers.note(updates("a"), false);
         assert!(!subscribers.receives_updates("/map"));

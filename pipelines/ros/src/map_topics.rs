@@ -51,7 +51,7 @@ impl MapTopics {
     pub(crate) fn watch(node: &Node) -> Result<Self, StageError> {
         let (subscribers, topics) = (Arc::<MapSubscribers>::default(), Arc::<Mutex<BTreeMap<_, _>>>::default());
         let to = Arc::clone(&subscribers);
-        node.watch(move |entity, is_present| to.note(entity, is_present))?;
+        node.watch(move |_, entity, is_present| to.note(entity, is_present))?;
         let (of, maps) = (Arc::clone(&subscribers), Arc::clone(&topics));
         let late_join_thread = thread::Builder::new().name("late maps".to_owned()).spawn(move || {
             while let Some(late_joiner) = of.next_late_joiner() {

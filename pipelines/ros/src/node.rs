@@ -1,167 +1,24 @@
-//! A ROS 2 node with its publishers and subscribers.
+//! A ROS 2 node with its publishers and subscribers, on each middleware that it speaks.
 
 use super::attachment::Attachment;
-use super::connection::{Connection, in_words, is_connected};
+use super::connection::Connection;
+use super::dds_node::{DdsNode, DdsPublisher, DdsSubscriber};
 use super::key_expression::Topic;
-use super::liveliness::{Entity, Kind};
+use super::liveliness::Entity;
+use super::middleware::{Middleware, Middlewares};
 use super::qos::Qos;
+use super::rtps;
+use super::zenoh_node::{ZenohNode, ZenohPublisher, ZenohSubscriber};
 use gridweave_runtime::stage::StageError;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
-use zenoh::liveliness::LivelinessToken;
-use zenoh::qos::CongestionControl;
-use zenoh::sample::{Sample, SampleKind};
-use zenoh::{Session, Wait};
-use zenoh_ext::{
-    AdvancedPublisher, AdvancedPublisherBuilderExt, AdvancedSubscriber, AdvancedSubscriberBuilderExt, CacheConfig,
-    HistoryConfig, MissDetectionConfig, RecoveryConfig,
-};
+use std::borrow::Cow;
+use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
 
-/// The period at which a transient-local publisher sends its sequence number after a new message, so that subscribers detect
-/// missed messages; the same as in `rmw_zenoh`.
-const HEARTBEAT: Duration = Duration::from_millis(500);
-/// The timeout of a request for the history of a publisher.
-const HISTORY_TIMEOUT: Duration = Duration::from_secs(600);
-
-/// A node with its own session.
+/// A node.
 pub(crate) struct Node {
-    session: Session,
-    identity: Entity,
-    /// The number of its next publisher or subscriber.
-    next_number: u32,
-    _token: LivelinessToken,
-    connection: Connection,
-}
-
-impl Node {
-    /// Joins the network as a node, named by the parameters or after the stage.
-    ///
-    /// # Errors
-    /// The network cannot be joined.
-    pub(crate) fn start(connection: Connection, stage: &str) -> Result<Self, StageError> {
-        let domain = connection.domain()?;
-        let session = connection.open()?;
-        let identity = Entity {
-            domain,
-            session: session.zid().to_string(),
-            node_number: 0,
-            number: 0,
-            namespace: "/".to_owned(),
-            node: connection.node.clone().unwrap_or_else(|| format!("gridweave_{}", usable(stage))),
-            kind: Kind::Node,
-        };
-        let token = declare(&session, &identity)?;
-        Ok(Self { session, identity, next_number: 1, _token: token, connection })
-    }
-
-    /// The id of its session.
-    pub(crate) fn session_name(&self) -> &str {
-        &self.identity.session
-    }
-
-    /// The addresses of routers, if it is connected to neither a router nor another program.
-    pub(crate) fn looks_for_router(&self) -> Option<String> {
-        (!is_connected(&self.session)).then(|| self.connection.routers())
-    }
-
-    /// The ROS domain.
-    pub(crate) fn domain(&self) -> u32 {
-        self.identity.domain
-    }
-
-    fn entity(&mut self, kind: Kind) -> Entity {
-        let number = self.next_number;
-        self.next_number += 1;
-        Entity { number, kind, ..self.identity.clone() }
-    }
-
-    /// Calls `call` with every present and future entity of the domain, and again when it disappears.
-    ///
-    /// # Errors
-    /// The session has failed.
-    pub(crate) fn watch(&self, call: impl Fn(Entity, bool) + Send + Sync + 'static) -> Result<(), StageError> {
-        let callback = move |sample: Sample| {
-            if let Ok(entity) = sample.key_expr().as_str().parse() {
-                call(entity, sample.kind() == SampleKind::Put);
-            }
-        };
-        let watched = self.session.liveliness().declare_subscriber(Entity::all(self.identity.domain)).history(true);
-        let watched = watched.callback(callback).background().wait();
-        watched.map_err(|error| StageError::new("discover ROS 2 programs", in_words(&error)))
-    }
-
-    /// Creates a publisher of a topic.
-    ///
-    /// # Errors
-    /// The topic has an invalid name, or the session has failed.
-    pub(crate) fn publish(&mut self, topic: Topic, qos: Qos) -> Result<Publisher, StageError> {
-        let (name, key) = (topic.name.clone(), topic.key_expression(self.identity.domain));
-        let failed = |error: zenoh::Error| StageError::new(format!("publish `{name}`"), in_words(&error));
-        let mut publisher = self.session.declare_publisher(key).congestion_control(CongestionControl::Block).advanced();
-        if qos.is_latched {
-            publisher = publisher
-                .cache(CacheConfig::default().max_samples(qos.depth.unwrap_or(usize::MAX)))
-                .sample_miss_detection(MissDetectionConfig::default().sporadic_heartbeat(HEARTBEAT))
-                .publisher_detection();
-        }
-        let publisher = publisher.wait().map_err(failed)?;
-        let entity = self.entity(Kind::Publisher(topic, qos));
-        let token = declare(&self.session, &entity)?;
-        Ok(Publisher { publisher, gid: entity.gid(), sequence: 0, name, _token: token })
-    }
-
-    /// Subscribes to a topic: calls `call` with each message, first with those that its publishers have retained.
-    ///
-    /// # Errors
-    /// The topic has an invalid name, or the session has failed.
-    pub(crate) fn subscribe(
-        &mut self,
-        topic: Topic,
-        qos: Qos,
-        call: impl Fn(Sample) + Send + Sync + 'static,
-    ) -> Result<Subscriber, StageError> {
-        let (name, key) = (topic.name.clone(), topic.key_expression(self.identity.domain));
-        let failed = |error: zenoh::Error| StageError::new(format!("subscribe to `{name}`"), in_words(&error));
-        let mut subscriber = self.session.declare_subscriber(key).callback(call).advanced();
-        if qos.is_latched {
-            let history = HistoryConfig::default().detect_late_publishers();
-            subscriber = subscriber
-                .history(history.max_samples(qos.depth.unwrap_or(usize::MAX)))
-                .recovery(RecoveryConfig::default().heartbeat())
-                .query_timeout(HISTORY_TIMEOUT)
-                .subscriber_detection();
-        }
-        let subscriber = subscriber.wait().map_err(failed)?;
-        let entity = self.entity(Kind::Subscriber(topic, qos));
-        Ok(Subscriber { _subscriber: subscriber, _token: declare(&self.session, &entity)? })
-    }
-}
-
-/// A publisher of a topic.
-pub(crate) struct Publisher {
-    publisher: AdvancedPublisher<'static>,
-    gid: [u8; 16],
-    sequence: i64,
-    name: String,
-    _token: LivelinessToken,
-}
-
-impl Publisher {
-    /// Publishes an encoded message.
-    ///
-    /// # Errors
-    /// The session has failed.
-    pub(crate) fn send(&mut self, message: &[u8]) -> Result<(), StageError> {
-        self.sequence += 1;
-        let attachment = Attachment { sequence: self.sequence, source_time: nanoseconds_now(), gid: self.gid };
-        let sent = self.publisher.put(message).attachment(attachment.to_bytes().as_slice()).wait();
-        sent.map_err(|error| StageError::new(format!("publish `{}`", self.name), in_words(&error)))
-    }
-}
-
-/// A subscriber of a topic, until it is dropped.
-pub(crate) struct Subscriber {
-    _subscriber: AdvancedSubscriber<()>,
-    _token: LivelinessToken,
+    domain: u32,
+    dds: Option<DdsNode>,
+    zenoh: Option<ZenohNode>,
 }
 
 /// The system clock, nanoseconds since the Unix epoch. It is only read where messages come from or go to other programs.
@@ -170,9 +27,179 @@ pub(crate) fn nanoseconds_now() -> i64 {
     i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }
 
-fn declare(session: &Session, entity: &Entity) -> Result<LivelinessToken, StageError> {
-    let token = session.liveliness().declare_token(entity.to_string()).wait();
-    token.map_err(|error| StageError::new(format!("announce {}", entity.full_node_name()), in_words(&error)))
+/// A message as it was received.
+pub(crate) enum Received {
+    Dds(rtps::Sample),
+    Zenoh(zenoh::sample::Sample),
+}
+
+/// What is known of a message beside its content.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Sent {
+    /// The number that its publisher has given it.
+    pub(crate) sequence: u32,
+    /// When it was sent, nanoseconds since the Unix epoch.
+    pub(crate) time: Option<u64>,
+}
+
+impl Received {
+    /// The encoded message.
+    pub(crate) fn content(&self) -> Cow<'_, [u8]> {
+        match self {
+            Self::Dds(sample) => Cow::Borrowed(&sample.payload),
+            Self::Zenoh(sample) => sample.payload().to_bytes(),
+        }
+    }
+
+    /// What its publisher says of it; `None` if it says nothing.
+    pub(crate) fn sent(&self) -> Option<Sent> {
+        match self {
+            Self::Dds(sample) => {
+                let time = sample.published.and_then(|time| u64::try_from(time).ok());
+                Some(Sent { sequence: sample.sequence as u32, time })
+            }
+            Self::Zenoh(sample) => {
+                let attachment = Attachment::from_bytes(&sample.attachment()?.to_bytes())?;
+                let time = u64::try_from(attachment.source_time).ok();
+                Some(Sent { sequence: attachment.sequence as u32, time })
+            }
+        }
+    }
+}
+
+impl Node {
+    /// Joins the network as a node, named by the parameters or after the stage.
+    ///
+    /// # Errors
+    /// The network cannot be joined. Where either middleware would do, that is only so if neither can.
+    pub(crate) fn start(connection: Connection, stage: &str) -> Result<Self, StageError> {
+        let domain = connection.domain()?;
+        let name = connection.node.clone().unwrap_or_else(|| format!("gridweave_{}", usable(stage)));
+        let middlewares = connection.middleware;
+        let dds = match middlewares.has(Middleware::Dds) {
+            true => connection.join_dds(domain, &name).map(Some),
+            false => Ok(None),
+        };
+        let dds = match (dds, middlewares) {
+            (Err(error), Middlewares::Auto) => {
+                tracing::warn!("robots on DDS are not heard: {error}");
+                None
+            }
+            (dds, _) => dds?,
+        };
+        let zenoh =
+            middlewares.has(Middleware::Zenoh).then(|| ZenohNode::start(connection, domain, &name)).transpose()?;
+        Ok(Self { domain, dds, zenoh })
+    }
+
+    /// The names of its session and its participant.
+    pub(crate) fn session_names(&self) -> Vec<String> {
+        let zenoh = self.zenoh.as_ref().map(|node| node.session_name().to_owned());
+        self.dds.as_ref().map(DdsNode::session_name).into_iter().chain(zenoh).collect()
+    }
+
+    /// Whether it is on DDS.
+    pub(crate) const fn has_dds(&self) -> bool {
+        self.dds.is_some()
+    }
+
+    /// Whether it is on Zenoh.
+    pub(crate) const fn has_zenoh(&self) -> bool {
+        self.zenoh.is_some()
+    }
+
+    /// The addresses of Zenoh's routers, if it is to be on Zenoh and is connected to neither a router nor another program.
+    pub(crate) fn looks_for_router(&self) -> Option<String> {
+        self.zenoh.as_ref().and_then(ZenohNode::looks_for_router)
+    }
+
+    /// The ROS domain.
+    pub(crate) const fn domain(&self) -> u32 {
+        self.domain
+    }
+
+    /// Calls `call` with every present and future entity of the domain, and again when it disappears.
+    ///
+    /// # Errors
+    /// A session has failed.
+    pub(crate) fn watch(
+        &self,
+        call: impl Fn(Middleware, Entity, bool) + Send + Sync + 'static,
+    ) -> Result<(), StageError> {
+        let call = Arc::new(call);
+        if let Some(node) = &self.dds {
+            let call = Arc::clone(&call);
+            node.watch(move |entity, is_there| call(Middleware::Dds, entity, is_there));
+        }
+        match &self.zenoh {
+            Some(node) => node.watch(move |entity, is_there| call(Middleware::Zenoh, entity, is_there)),
+            None => Ok(()),
+        }
+    }
+
+    /// Problems with other nodes that have come up since the last call. They were logged already.
+    pub(crate) fn take_problems(&self) -> Vec<String> {
+        self.dds.as_ref().map(DdsNode::take_problems).unwrap_or_default()
+    }
+
+    /// Creates a publisher of a topic.
+    ///
+    /// # Errors
+    /// The topic has an invalid name, or a session has failed.
+    pub(crate) fn publish(&mut self, topic: Topic, qos: Qos) -> Result<Publisher, StageError> {
+        let dds = self.dds.as_ref().map(|node| node.publish(&topic, qos));
+        Ok(Publisher { dds, zenoh: self.zenoh.as_mut().map(|node| node.publish(topic, qos)).transpose()? })
+    }
+
+    /// Subscribes to a topic on a middleware: calls `call` with each message, first with those that its publishers have retained.
+    ///
+    /// # Errors
+    /// The topic has an invalid name, or a session has failed.
+    pub(crate) fn subscribe(
+        &mut self,
+        middleware: Middleware,
+        topic: Topic,
+        qos: Qos,
+        call: impl Fn(Received) + Send + Sync + 'static,
+    ) -> Result<Subscriber, StageError> {
+        let (dds, zenoh) = match middleware {
+            Middleware::Dds => {
+                let subscribe = |node: &DdsNode| node.subscribe(&topic, qos, move |sample| call(Received::Dds(sample)));
+                (self.dds.as_ref().map(subscribe), None)
+            }
+            Middleware::Zenoh => {
+                let subscribe =
+                    |node: &mut ZenohNode| node.subscribe(topic, qos, move |sample| call(Received::Zenoh(sample)));
+                (None, self.zenoh.as_mut().map(subscribe).transpose()?)
+            }
+        };
+        Ok(Subscriber { _dds: dds, _zenoh: zenoh })
+    }
+}
+
+/// A publisher of a topic.
+pub(crate) struct Publisher {
+    dds: Option<DdsPublisher>,
+    zenoh: Option<ZenohPublisher>,
+}
+
+impl Publisher {
+    /// Publishes an encoded message.
+    ///
+    /// # Errors
+    /// A session has failed.
+    pub(crate) fn send(&mut self, message: &[u8]) -> Result<(), StageError> {
+        if let Some(publisher) = &self.dds {
+            publisher.send(message);
+        }
+        self.zenoh.as_mut().map_or(Ok(()), |publisher| publisher.send(message))
+    }
+}
+
+/// A subscriber of a topic, until it is dropped.
+pub(crate) struct Subscriber {
+    _dds: Option<DdsSubscriber>,
+    _zenoh: Option<ZenohSubscriber>,
 }
 
 /// The name of a stage as part of a node's name.

@@ -23,9 +23,10 @@ impl RobotTrees {
     /// The session has failed.
     pub(crate) fn watch(node: &Node) -> Result<Self, StageError> {
         let seen = Arc::<Mutex<BTreeMap<String, String>>>::default();
-        let (to, own) = (Arc::clone(&seen), node.session_name().to_owned());
-        node.watch(move |entity, is_present| {
-            if let Some((robot, namespace)) = robot_tree(&entity).filter(|_| is_present && entity.session != own) {
+        let (to, own) = (Arc::clone(&seen), node.session_names());
+        node.watch(move |_, entity, is_present| {
+            let is_other = is_present && !own.contains(&entity.session);
+            if let Some((robot, namespace)) = robot_tree(&entity).filter(|_| is_other) {
                 to.lock().unwrap_or_else(PoisonError::into_inner).insert(robot, namespace);
             }
         })?;

@@ -1,8 +1,10 @@
 //! The stage `ros_sink`: publishes results as a ROS 2 node.
 
 use super::connection::{Connection, LISTEN, ROUTER};
+use super::discovery_range::DiscoveryRange;
 use super::key_expression::Topic;
 use super::map_topics::{MapTopics, Sent};
+use super::middleware::Middlewares;
 use super::node::{Node, Publisher};
 use super::qos::Qos;
 use super::robot_trees::{RobotTrees, in_robot_tree};
@@ -25,6 +27,15 @@ const DEPTH: usize = 10;
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SinkParameters {
+    /// The middlewares of ROS 2 on which everything is published: `auto` for both, `dds` for the default of ROS 2 alone (Fast DDS, Cyclone
+    /// DDS), `zenoh` for `rmw_zenoh_cpp` alone.
+    pub middleware: Middlewares,
+    /// Where programs on DDS are looked for: `subnet` for the networks of this machine, `localhost` for this machine alone. If it is not
+    /// given, the environment variables ROS_LOCALHOST_ONLY and ROS_AUTOMATIC_DISCOVERY_RANGE say it, as for ROS 2 programs.
+    pub discovery_range: Option<DiscoveryRange>,
+    /// Machines on which programs on DDS are looked for one by one, by name or address, where multicast does not reach them. If none are
+    /// given, those that the environment variable ROS_STATIC_PEERS names.
+    pub static_peers: Vec<String>,
     /// The ROS domain. The default is the environment variable ROS_DOMAIN_ID, or 0.
     pub domain: Option<u32>,
     /// The Zenoh routers and programs to connect to, as `tcp/HOST:PORT`. The connection is retried until it succeeds.
@@ -47,6 +58,9 @@ pub struct SinkParameters {
 impl Default for SinkParameters {
     fn default() -> Self {
         Self {
+            middleware: Middlewares::default(),
+            discovery_range: None,
+            static_peers: Vec::new(),
             domain: None,
             connect: vec![ROUTER.to_owned()],
             listen: vec![LISTEN.to_owned()],
@@ -64,8 +78,9 @@ impl SinkParameters {
     }
 
     fn connection(&self) -> Connection {
-        let Self { domain, connect, listen, zenoh_config, node, .. } = self.clone();
-        Connection { domain, connect, listen, zenoh_config, node }
+        let Self { middleware, discovery_range, static_peers, domain, connect, listen, zenoh_config, node, .. } =
+            self.clone();
+        Connection { middleware, discovery_range, static_peers, domain, connect, listen, zenoh_config, node }
     }
 }
 
@@ -93,7 +108,7 @@ fn is_topic(name: &str) -> bool {
 pub fn kind() -> StageKind {
     StageKind::stage(
         "ros_sink",
-        "Publishes its inputs in ROS 2, over Zenoh with the protocol of `rmw_zenoh_cpp`, on the topics that they have in a log. \
+        "Publishes its inputs in ROS 2, over DDS and over Zenoh as `rmw_zenoh_cpp` speaks it, on the topics that they have in a log. \
          States such as maps and static transforms are retained for late joiners (transient local). Of a map only the changed \
          part is sent if all subscribers support that. A frame is published again only after it has moved by more than its \
          uncertainty, given by the covariances in `gridweave_msgs/msg/RobotFrames`, if these are an input",
@@ -143,6 +158,7 @@ impl RosSink {
     }
 
     fn receive(&mut self, message: &Message, output: &Output<()>) -> Result<(), StageError> {
+        self.node.take_problems().into_iter().for_each(|problem| output.warn(problem));
         let ros_type = self.types.get(message.wire()).cloned().unwrap_or_default();
         let topic = message.header().topic.as_str().to_owned();
         self.publish_in_robot_trees(output)?;

@@ -1,12 +1,13 @@
 //! The stage `ros_source`: takes what robots publish into a live pipeline.
 
-use super::attachment::Attachment;
 use super::definitions::Definitions;
 use super::inbox::{Event, Inbox};
 use super::key_expression::{NO_HASH, Topic};
 use super::liveliness::{Entity, Kind};
-use super::node::{Node, Subscriber, nanoseconds_now};
+use super::middleware::Middleware;
+use super::node::{Node, Received, Subscriber, nanoseconds_now};
 use super::qos::Qos;
+use super::silence::Silence;
 use super::source_parameters::SourceParameters;
 use gridweave_logs::qos;
 use gridweave_logs::source::{LiveMessage, LiveRouter, RobotMessages};
@@ -15,19 +16,16 @@ use gridweave_runtime::stage::{Context, Output, Source, StageError, StageKind};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use zenoh::sample::Sample;
 
 /// So many events are handled at a time.
 const BATCH: usize = 64;
-/// The time that a router may take to answer before a warning.
-const PATIENCE: Duration = Duration::from_secs(3);
 
 /// The kind `ros_source`.
 pub fn kind() -> StageKind {
     StageKind::source(
         "ros_source",
-        "Takes what robots publish in ROS 2 into a live pipeline while it runs, over Zenoh as `rmw_zenoh_cpp` speaks it: maps and \
-         their updates, poses, transforms and readings of tags, and scans of robots without a map, on the topics that `[robots]` \
+        "Takes what robots publish in ROS 2 into a live pipeline while it runs, over DDS (Fast DDS, Cyclone DDS) and over Zenoh as \
+         `rmw_zenoh_cpp` speaks it: maps and their updates, poses, transforms and readings of tags, and scans of robots without a map, on the topics that `[robots]` \
          names. Robots come and go as they like",
         RosSource::new,
     )
@@ -37,35 +35,40 @@ pub fn kind() -> StageKind {
 /// Takes what robots publish.
 pub struct RosSource {
     node: Node,
-    inbox: Arc<Inbox<Sample>>,
+    inbox: Arc<Inbox<Received>>,
     router: LiveRouter,
     definitions: Definitions,
     keep_last: usize,
     /// The topics that were ever seen.
-    topics: BTreeMap<Topic, Seen>,
+    topics: BTreeMap<Offered, Seen>,
     /// Publishers of scans of robots that may yet publish a map, and since when they are known.
-    waiting_scans: Vec<(Instant, Entity)>,
+    waiting_scans: Vec<(Instant, Middleware, Entity)>,
     wait_for_map: Duration,
     update_period: Duration,
-    discovery_timeout: Duration,
+    silence: Silence,
     /// Whether another program has published anything.
     has_publishers: bool,
     /// When the maps with updates were sent last.
     updates_sent: Instant,
     /// Those of the topics that are heard.
-    subscribers: BTreeMap<Topic, Subscriber>,
+    subscribers: BTreeMap<Offered, Subscriber>,
     /// Warnings that were given.
     warned: BTreeSet<String>,
-    /// Whether a router or another program has answered, and since when that has been so.
-    is_connected: bool,
-    changed: Instant,
     log_time: u64,
+}
+
+/// A topic on a middleware.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Offered {
+    topic: Topic,
+    middleware: Middleware,
 }
 
 /// A topic that was seen.
 struct Seen {
     /// Its number in the router.
     number: usize,
+    /// What all that publish it offer.
     qos: Qos,
     /// Those that publish it.
     publishers: BTreeSet<Entity>,
@@ -81,7 +84,7 @@ impl RosSource {
         let duration = |seconds| Duration::try_from_secs_f64(seconds).unwrap_or_default();
         let inbox = Arc::new(Inbox::default());
         let events = Arc::clone(&inbox);
-        node.watch(move |entity, is_there| events.push(Event::Entity(entity, is_there), 0))?;
+        node.watch(move |on, entity, is_there| events.push(Event::Entity(on, entity, is_there), 0))?;
         Ok(Self {
             node,
             inbox,
@@ -92,13 +95,11 @@ impl RosSource {
             waiting_scans: Vec::new(),
             wait_for_map: duration(parameters.wait_for_map),
             update_period: duration(parameters.update_period),
-            discovery_timeout: duration(parameters.discovery_timeout),
+            silence: Silence::new(duration(parameters.discovery_timeout)),
             has_publishers: false,
             updates_sent: Instant::now(),
             subscribers: BTreeMap::new(),
             warned: BTreeSet::new(),
-            is_connected: false,
-            changed: Instant::now(),
             log_time: 0,
         })
     }
@@ -106,27 +107,31 @@ impl RosSource {
     /// A program has come or gone.
     fn note_entity(
         &mut self,
+        middleware: Middleware,
         entity: Entity,
         is_there: bool,
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
         let Kind::Publisher(topic, qos) = entity.kind.clone() else { return Ok(()) };
-        if entity.session == self.node.session_name() {
+        if self.node.session_names().contains(&entity.session) {
             return Ok(());
         }
-        self.has_publishers |= is_there;
+        let offered = Offered { topic, middleware };
         if !is_there {
-            self.waiting_scans.retain(|(_, waiting)| *waiting != entity);
-            if let Some(seen) = self.topics.get_mut(&topic) {
+            self.waiting_scans.retain(|(_, _, waiting)| *waiting != entity);
+            if let Some(seen) = self.topics.get_mut(&offered) {
                 seen.publishers.remove(&entity);
+                // Another middleware may have the topic, too.
+                return self.subscribe(output);
             }
             return Ok(());
         }
-        if !self.topics.contains_key(&topic) {
-            let channel = self.channel(&topic, qos);
+        if !self.topics.contains_key(&offered) {
+            let channel = self.channel(&offered.topic, qos);
+            self.has_publishers |= !is_of_every_node(&channel.topic);
             if self.router.scanning_robot(&channel).is_some() {
                 if output.takes_scans() {
-                    self.waiting_scans.push((Instant::now(), entity));
+                    self.waiting_scans.push((Instant::now(), middleware, entity));
                     return Ok(());
                 }
                 if !self.router.is_asked_for(&channel) {
@@ -134,18 +139,18 @@ impl RosSource {
                 }
             }
         }
-        self.add_publisher(topic, qos, entity, output)
+        self.add_publisher(offered, qos, entity, output)
     }
 
     /// Takes up the topics with scans of robots that had time enough to publish a map.
     fn end_waiting(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
         let has_waited = |since: &Instant| since.elapsed() >= self.wait_for_map;
         let (ready, waiting) =
-            std::mem::take(&mut self.waiting_scans).into_iter().partition(|(since, _)| has_waited(since));
+            std::mem::take(&mut self.waiting_scans).into_iter().partition(|(since, ..)| has_waited(since));
         self.waiting_scans = waiting;
-        for (_, entity) in ready {
+        for (_, middleware, entity) in ready {
             let Kind::Publisher(topic, qos) = entity.kind.clone() else { continue };
-            self.add_publisher(topic, qos, entity, output)?;
+            self.add_publisher(Offered { topic, middleware }, qos, entity, output)?;
         }
         Ok(())
     }
@@ -153,24 +158,30 @@ impl RosSource {
     /// Takes up what publishes a topic.
     fn add_publisher(
         &mut self,
-        topic: Topic,
+        offered: Offered,
         qos: Qos,
         entity: Entity,
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
-        let number = match self.topics.get_mut(&topic) {
+        let number = match self.topics.get_mut(&offered) {
             Some(seen) => {
                 seen.publishers.insert(entity);
+                let qos = seen.offered_by_all();
+                // On DDS nobody is heard who offers less than what is requested.
+                if offered.middleware == Middleware::Dds && seen.qos != qos {
+                    self.subscribers.remove(&offered);
+                }
+                seen.qos = qos;
                 seen.number
             }
             None => {
-                let number = self.router.add(self.channel(&topic, qos));
+                let number = self.router.add(self.channel(&offered.topic, qos));
                 let seen = Seen { number, qos, publishers: BTreeSet::from([entity]) };
-                self.topics.insert(topic.clone(), seen);
+                self.topics.insert(offered.clone(), seen);
                 number
             }
         };
-        self.check_publishers(&topic.name, number, output);
+        self.check_publishers(&offered, number, output);
         self.subscribe(output)
     }
 
@@ -178,16 +189,26 @@ impl RosSource {
     fn subscribe(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
         self.leave_topics();
         let mut wrong = Vec::new();
-        for (topic, seen) in &self.topics {
-            let number = seen.number;
+        for (offered, seen) in &self.topics {
+            let (topic, number) = (&offered.topic, seen.number);
             if let Some(mismatch) = self.router.mismatch(number) {
                 wrong.push(mismatch);
             }
             if !self.router.is_of_use(number) {
                 continue;
             }
-            if self.subscribers.contains_key(topic) {
+            if self.subscribers.contains_key(offered) {
                 continue;
+            }
+            if let Some(other) = self.on_another_middleware(offered) {
+                if self.topics.get(&other).is_some_and(|seen| !seen.publishers.is_empty()) {
+                    wrong.push(format!(
+                        "`{}` is published over {} and over {}: it is heard over {} alone",
+                        topic.name, offered.middleware, other.middleware, other.middleware
+                    ));
+                    continue;
+                }
+                self.subscribers.remove(&other);
             }
             let is_other = |here: &String| *here != topic.type_hash && topic.type_hash != NO_HASH;
             if let Some(here) = self.definitions.hash(topic).filter(is_other) {
@@ -202,25 +223,33 @@ impl RosSource {
             // The last map is all that counts.
             let depth = if is_map { 1 } else { seen.qos.depth.unwrap_or(self.keep_last).max(self.keep_last) };
             let inbox = Arc::clone(&self.inbox);
-            let call = move |message: Sample| {
+            let call = move |message: Received| {
                 inbox.push(Event::Message { topic: number, message, arrived: nanoseconds_now() }, depth);
             };
             let qos = Qos { depth: if is_map { Some(1) } else { seen.qos.depth }, ..seen.qos };
-            let subscriber = self.node.subscribe(topic.clone(), qos, call)?;
-            self.subscribers.insert(topic.clone(), subscriber);
-            tracing::info!("takes messages of {} on `{}`", topic.ros_type, topic.name);
+            let subscriber = self.node.subscribe(offered.middleware, topic.clone(), qos, call)?;
+            self.subscribers.insert(offered.clone(), subscriber);
+            tracing::info!("takes messages of {} on `{}` over {}", topic.ros_type, topic.name, offered.middleware);
         }
         wrong.into_iter().for_each(|wrong| self.warn_once(wrong, output));
         Ok(())
     }
 
+    /// The same topic on another middleware, if it is heard there.
+    fn on_another_middleware(&self, offered: &Offered) -> Option<Offered> {
+        let is_other =
+            |other: &&Offered| other.topic.name == offered.topic.name && other.middleware != offered.middleware;
+        self.subscribers.keys().find(is_other).cloned()
+    }
+
     /// Hears no more of topics that are of no use any longer, as another one has taken their place.
     fn leave_topics(&mut self) {
         let (topics, router) = (&self.topics, &self.router);
-        let is_left = |topic: &&Topic| topics.get(*topic).is_none_or(|seen| !router.is_of_use(seen.number));
-        let left: Vec<Topic> = self.subscribers.keys().filter(is_left).cloned().collect();
-        for topic in left {
-            self.subscribers.remove(&topic);
+        let is_left = |offered: &&Offered| topics.get(*offered).is_none_or(|seen| !router.is_of_use(seen.number));
+        let left: Vec<Offered> = self.subscribers.keys().filter(is_left).cloned().collect();
+        for offered in left {
+            self.subscribers.remove(&offered);
+            let topic = offered.topic;
             let channel = self.channel(&topic, Qos::reliable(1));
             match self.router.scanning_robot(&channel) {
                 Some(robot) => {
@@ -232,11 +261,13 @@ impl RosSource {
     }
 
     /// Two programs that publish the map or the pose of one robot are two robots of one name.
-    fn check_publishers(&mut self, name: &str, number: usize, output: &Output<RobotMessages>) {
+    fn check_publishers(&mut self, offered: &Offered, number: usize, output: &Output<RobotMessages>) {
         if !self.router.is_of_one_robot(number) {
             return;
         }
-        let of_name = self.topics.iter().filter(|(topic, _)| topic.name == name);
+        let name = offered.topic.name.as_str();
+        let is_same = |other: &Offered| other.topic.name == name && other.middleware == offered.middleware;
+        let of_name = self.topics.iter().filter(|(other, _)| is_same(other));
         let publishers: Vec<&Entity> = of_name.flat_map(|(_, seen)| &seen.publishers).collect();
         if publishers.len() > 1 {
             let nodes: Vec<String> = publishers
@@ -278,52 +309,54 @@ impl RosSource {
     fn take_message(
         &mut self,
         number: usize,
-        sample: &Sample,
+        message: &Received,
         arrived: i64,
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
         // The clock of the machine may be set back, and what is sent may not.
         self.log_time = self.log_time.max(u64::try_from(arrived).unwrap_or_default());
         output.set_log_time(LogTime(self.log_time));
-        let attachment = sample.attachment().and_then(|bytes| Attachment::from_bytes(&bytes.to_bytes()));
-        if attachment.is_none() {
+        let sent = message.sent();
+        if sent.is_none() {
             output.count("messages without an attachment", 1);
         }
-        let sent = attachment.and_then(|attachment| u64::try_from(attachment.source_time).ok());
-        let sequence = attachment.map_or(0, |attachment| attachment.sequence as u32);
-        let data = sample.payload().to_bytes();
-        let message = LiveMessage { sequence, publish_time: sent.unwrap_or(self.log_time), data: &data };
+        let (sequence, data) = (sent.map_or(0, |sent| sent.sequence), message.content());
+        let publish_time = sent.and_then(|sent| sent.time).unwrap_or(self.log_time);
+        let message = LiveMessage { sequence, publish_time, data: &data };
         self.router.send(number, message, output)
     }
 
-    /// Warns of a router that does not answer, and of a domain in which nobody publishes.
-    fn check_connection(&mut self, output: &Output<RobotMessages>) {
-        if self.has_publishers {
-            return;
-        }
-        match self.node.looks_for_router() {
-            None if !self.is_connected => {
-                (self.is_connected, self.changed) = (true, Instant::now());
-                tracing::info!("connected");
-            }
-            None if self.changed.elapsed() > self.discovery_timeout => {
-                let text = format!(
-                    "connected, but nobody publishes in the domain {}: robots on Fast DDS or Cyclone DDS are not heard, start their \
-                     nodes with RMW_IMPLEMENTATION=rmw_zenoh_cpp; or is their ROS_DOMAIN_ID another one?",
-                    self.node.domain()
-                );
-                self.warn_once(text, output);
-            }
-            Some(routers) if !self.is_connected && self.changed.elapsed() > PATIENCE => {
-                let text = format!(
-                    "no Zenoh router answers at {routers}: start one with `ros2 run rmw_zenoh_cpp rmw_zenohd`, or name it in `connect`. \
-                     It is looked for until it answers"
-                );
-                self.warn_once(text, output);
-            }
-            _ => {}
+    /// Warns of a domain in which nobody is heard, and of what other nodes do wrong.
+    fn check_network(&mut self, output: &Output<RobotMessages>) {
+        // They were logged already.
+        self.node.take_problems().into_iter().for_each(|problem| output.warn(problem));
+        if !self.has_publishers
+            && let Some(text) = self.silence.warning(&self.node)
+        {
+            self.warn_once(text, output);
         }
     }
+}
+
+impl Seen {
+    /// The quality of service that all that publish the topic offer.
+    fn offered_by_all(&self) -> Qos {
+        let offers = self.publishers.iter().filter_map(|entity| match &entity.kind {
+            Kind::Publisher(_, qos) => Some(*qos),
+            _ => None,
+        });
+        let both = |a: Qos, b: Qos| Qos {
+            is_reliable: a.is_reliable && b.is_reliable,
+            is_latched: a.is_latched && b.is_latched,
+            depth: a.depth.max(b.depth),
+        };
+        offers.reduce(both).unwrap_or(self.qos)
+    }
+}
+
+/// Whether every node of ROS publishes a topic of this name, whatever it does.
+fn is_of_every_node(topic: &str) -> bool {
+    ["/rosout", "/parameter_events"].contains(&topic)
 }
 
 impl Source for RosSource {
@@ -334,12 +367,12 @@ impl Source for RosSource {
     }
 
     fn next(&mut self, output: &Output<RobotMessages>) -> Result<bool, StageError> {
-        self.check_connection(output);
+        self.check_network(output);
         self.end_waiting(output)?;
         for _ in 0..BATCH {
             match self.inbox.take() {
                 None => break,
-                Some(Event::Entity(entity, is_there)) => self.note_entity(entity, is_there, output)?,
+                Some(Event::Entity(on, entity, is_there)) => self.note_entity(on, entity, is_there, output)?,
                 Some(Event::Message { topic, message, arrived }) => {
                     self.take_message(topic, &message, arrived, output)?;
                 }

@@ -1,6 +1,8 @@
 //! The parameters of `ros_source`.
 
 use super::connection::{Connection, LISTEN, ROUTER};
+use super::discovery_range::DiscoveryRange;
+use super::middleware::Middlewares;
 use gridweave_logs::source::CellValues;
 use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
@@ -11,6 +13,15 @@ use std::path::PathBuf;
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SourceParameters {
+    /// The middlewares of ROS 2 on which robots are heard: `auto` for both, `dds` for the default of ROS 2 alone (Fast DDS, Cyclone
+    /// DDS), `zenoh` for `rmw_zenoh_cpp` alone.
+    pub middleware: Middlewares,
+    /// Where robots on DDS are looked for: `subnet` for the networks of this machine, `localhost` for this machine alone. If it is not
+    /// given, the environment variables ROS_LOCALHOST_ONLY and ROS_AUTOMATIC_DISCOVERY_RANGE say it, as for ROS 2 programs.
+    pub discovery_range: Option<DiscoveryRange>,
+    /// Machines on which robots on DDS are looked for one by one, by name or address, where multicast does not reach them. If none are
+    /// given, those that the environment variable ROS_STATIC_PEERS names.
+    pub static_peers: Vec<String>,
     /// The ROS domain. If it is not given, the environment variable ROS_DOMAIN_ID says it, or else it is 0.
     pub domain: Option<u32>,
     /// The Zenoh routers and programs to connect to, as `tcp/HOST:PORT`. Until one answers it is looked for.
@@ -48,6 +59,9 @@ pub struct SourceParameters {
 impl Default for SourceParameters {
     fn default() -> Self {
         Self {
+            middleware: Middlewares::default(),
+            discovery_range: None,
+            static_peers: Vec::new(),
             domain: None,
             connect: vec![ROUTER.to_owned()],
             listen: vec![LISTEN.to_owned()],
@@ -66,8 +80,9 @@ impl Default for SourceParameters {
 
 impl SourceParameters {
     pub(crate) fn connection(&self) -> Connection {
-        let Self { domain, connect, listen, zenoh_config, node, .. } = self.clone();
-        Connection { domain, connect, listen, zenoh_config, node }
+        let Self { middleware, discovery_range, static_peers, domain, connect, listen, zenoh_config, node, .. } =
+            self.clone();
+        Connection { middleware, discovery_range, static_peers, domain, connect, listen, zenoh_config, node }
     }
 }
 

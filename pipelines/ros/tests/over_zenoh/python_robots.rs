@@ -60,8 +60,10 @@ fn one_map(pipeline: &str, topics: &str, scripts: [&str; 2], more: &[&str]) {
     run(GRIDWEAVE, &["filter", "in.mcap", "-o", "robots.mcap", "--topics", topics], folder);
 
     let router = Router::start();
-    let connect =
-        [format!("robots.connect=[\"{}\"]", router.endpoint()), format!("ros.connect=[\"{}\"]", router.endpoint())];
+    let connect = ["robots", "ros"].into_iter().flat_map(|stage| {
+        [format!("{stage}.middleware=\"zenoh\""), format!("{stage}.connect=[\"{}\"]", router.endpoint())]
+    });
+    let connect: Vec<String> = connect.collect();
     let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join(pipeline);
     let arguments: Vec<&OsStr> = ["run".as_ref(), pipeline.as_os_str()]
         .into_iter()

@@ -63,7 +63,7 @@ impl Router {
 
     /// The parameters of a stage that connects to it.
     pub(crate) fn parameters(&self) -> String {
-        format!("domain = 0\nconnect = [\"{}\"]\nlisten = [\"tcp/127.0.0.1:0\"]", self.endpoint)
+        format!("middleware = \"zenoh\"\ndomain = 0\nconnect = [\"{}\"]\nlisten = [\"tcp/127.0.0.1:0\"]", self.endpoint)
     }
 }
 

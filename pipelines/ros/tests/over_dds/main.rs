@@ -1,0 +1,11 @@
+//! The stages, and the whole command, among programs that speak DDS to each other on this machine.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+#[path = "../over_zenoh/command.rs"]
+#[allow(dead_code)]
+mod command;
+mod domain;
+mod quality;
+mod ros_nodes;
+mod stages;

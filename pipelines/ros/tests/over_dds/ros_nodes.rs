@@ -1,0 +1,166 @@
+//! The stages, and the whole command, among real nodes of ROS 2: rclpy on Fast DDS, and programs on Cyclone DDS.
+//!
+//! `GRIDWEAVE_ROS_PYTHON` names a Python 3.12 with what is in `tests/python/ros_requirements.txt`.
+
+use crate::command::{GRIDWEAVE, Running, run};
+use crate::domain::{Domain, give, go_on, map, sent, warned};
+use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage, encode};
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+fn script(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(name)
+}
+
+/// Starts a program of a script in a domain, on this machine alone.
+#[track_caller]
+fn start(name: &str, domain: &Domain, arguments: &[&str], folder: &Path) -> Running {
+    let python = std::env::var("GRIDWEAVE_ROS_PYTHON").expect("GRIDWEAVE_ROS_PYTHON names a Python with rclpy");
+    let settings = [
+        format!("ROS_DOMAIN_ID={}", domain.number()),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST".to_owned(),
+        "RMW_IMPLEMENTATION=rmw_fastrtps_cpp".to_owned(),
+        format!("FASTRTPS_DEFAULT_PROFILES_FILE={}", script("loopback.xml").display()),
+        format!("ROS_LOG_DIR={}", folder.display()),
+    ];
+    let program = [python, script(name).display().to_string()];
+    let arguments = arguments.iter().map(|argument| (*argument).to_owned());
+    let all: Vec<String> = settings.into_iter().chain(program).chain(arguments).collect();
+    Running::start("env", &all, folder, &format!("{name}.log"))
+}
+
+/// The same of one that says on its first line that it is ready.
+#[track_caller]
+fn start_ready(name: &str, domain: &Domain, arguments: &[&str], words: &str, folder: &Path) -> Running {
+    let mut running = start(name, domain, arguments, folder);
+    let mut line = String::new();
+    BufReader::new(running.stdout()).read_line(&mut line).unwrap();
+    assert_eq!(line.trim_end(), words, "{}", running.errors());
+    running
+}
+
+fn rclpy(domain: &Domain, arguments: &[&str], folder: &Path) -> Running {
+    start_ready("rclpy_nodes.py", domain, arguments, "all is sent", folder)
+}
+
+/// What a program prints until its good end, as JSON.
+#[track_caller]
+fn printed(mut running: Running) -> serde_json::Value {
+    serde_json::from_str(&running.end_with(0)).unwrap()
+}
+
+/// The whole command merges what robots on Fast DDS publish. A viewer that comes late has the map, one on Cyclone the frames, and
+/// robots that end and come again do no harm.
+#[test]
+#[ignore = "needs a Python with rclpy, named by GRIDWEAVE_ROS_PYTHON"]
+fn robots_on_fast_dds_have_one_map() {
+    let (folder, domain) = (TempDir::new().unwrap(), Domain::new());
+    let folder = folder.path();
+    let building = ["width=12", "height=10", "drift=0", "overlap=0.9", "tags=24", "beams=180", "duration=60"];
+    let building = building.into_iter().flat_map(|setting| ["--set", setting]);
+    let simulate: Vec<&str> = ["simulate", "-o", "in.mcap", "--robots", "2"].into_iter().chain(building).collect();
+    run(GRIDWEAVE, &simulate, folder);
+    run(GRIDWEAVE, &["filter", "in.mcap", "-o", "robots.mcap", "--topics", "/{robot}/map,/{robot}/pose"], folder);
+
+    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("live_ros.toml");
+    let number = domain.number();
+    let settings = ["robots", "ros"].into_iter().flat_map(|stage| {
+        ["middleware=\"dds\"".to_owned(), "discovery_range=\"localhost\"".to_owned(), format!("domain={number}")]
+            .map(|setting| format!("{stage}.{setting}"))
+    });
+    let arguments = ["run".to_owned(), pipeline.display().to_string(), "--summary".into(), "summary.json".into()];
+    let settings = settings.flat_map(|setting| ["--set".to_owned(), setting]);
+    let arguments: Vec<String> = arguments.into_iter().chain(settings).collect();
+    let mut merging = Running::start(GRIDWEAVE, &arguments, folder, "merging.log");
+
+    let robots = rclpy(&domain, &["robots", "robots.mcap", "6"], folder);
+    for _ in 0..2 {
+        let seen = printed(start("rclpy_nodes.py", &domain, &["view", "30000", "200"], folder));
+        assert_eq!(seen["map"]["frame"], "world");
+        assert_eq!(seen["publisher"][0], "gridweave_ros");
+        assert_eq!(seen["publisher"][1], "nav_msgs/msg/OccupancyGrid");
+        assert_eq!(seen["publisher"][3], "TRANSIENT_LOCAL");
+        let frames = printed(start("cyclone_nodes.py", &domain, &["frames", "2", "200"], folder));
+        for robot in ["robot1/map", "robot2/map"] {
+            assert_eq!(frames[robot]["parent"], "world", "{frames}");
+        }
+    }
+    drop(robots);
+    let _again = rclpy(&domain, &["robots", "robots.mcap", "6"], folder);
+    merging.signal("INT");
+    merging.end_with(0);
+    assert!(!merging.errors().contains("warning"), "{}", merging.errors());
+    run(GRIDWEAVE, &["evaluate", "summary.json", "--truth", "in.truth.json"], folder);
+}
+
+#[test]
+#[ignore = "needs a Python with rclpy, named by GRIDWEAVE_ROS_PYTHON"]
+fn maps_of_16_mb_go_both_ways() {
+    let (folder, domain) = (TempDir::new().unwrap(), Domain::new());
+    let mut source = domain.source("");
+    let _robot = rclpy(&domain, &["publish_map", "/robot1/map", "4000", "7"], folder.path());
+    let message = sent(&mut source, "map", 1).remove(0);
+    let grid: OccupancyGrid<'_> = message.decode().unwrap();
+    assert!(grid.data.len() == 16_000_000 && grid.data.iter().all(|cell| *cell == 7));
+
+    let mut sink = domain.sink("gridweave_ros", &[(OccupancyGrid::NAME, "/map")]);
+    give(&mut sink, 0, "/map", map(4000, 9));
+    let seen = printed(start("rclpy_nodes.py", &domain, &["view", "16000000", "60"], folder.path()));
+    assert_eq!((&seen["map"]["width"], &seen["map"]["known"]), (&4000.into(), &16_000_000.into()));
+}
+
+#[test]
+#[ignore = "needs a Python with rclpy, named by GRIDWEAVE_ROS_PYTHON"]
+fn transforms_on_cyclone_dds_are_poses() {
+    let (folder, domain) = (TempDir::new().unwrap(), Domain::new());
+    let mut source = domain.source("");
+    let _robot = rclpy(&domain, &["publish_map", "/robot7/map", "20", "0"], folder.path());
+    let _transforms = start("cyclone_nodes.py", &domain, &["tf", "robot7"], folder.path());
+    let pose = sent(&mut source, "pose", 1).remove(0).decode::<PoseStamped>().unwrap();
+    assert_eq!((pose.header.frame_id.as_str(), pose.pose.position.x), ("robot7/map", 3.0));
+}
+
+#[test]
+#[ignore = "needs a Python with rclpy, named by GRIDWEAVE_ROS_PYTHON"]
+fn who_asks_for_more_than_is_offered_is_told_with_both_settings() {
+    let (folder, domain) = (TempDir::new().unwrap(), Domain::new());
+    let mut sink = domain.sink("gridweave_ros", &[(PoseStamped::NAME, "/odd")]);
+    let pose = || encode(&PoseStamped::default()).unwrap();
+    give(&mut sink, 0, "/odd", pose());
+    let _picky = start_ready("rclpy_nodes.py", &domain, &["ask_for_more"], "incompatible", folder.path());
+    go_on_sending(&mut sink, "cannot match");
+    let warnings = sink.warnings();
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    let (text, count) = warnings.into_iter().next().unwrap();
+    assert_eq!(count, 1);
+    for words in ["/picky subscribes to `/odd`", "reliable, transient local", "reliable, volatile", "durability"] {
+        assert!(text.contains(words), "{text}");
+    }
+}
+
+/// Publishes until there is a warning.
+#[track_caller]
+fn go_on_sending(sink: &mut gridweave_runtime::stage::StageHarness, words: &str) {
+    let until = std::time::Instant::now() + crate::domain::WATCHDOG;
+    while !sink.warnings().keys().any(|text| text.contains(words)) {
+        assert!(std::time::Instant::now() < until, "{:?}", sink.warnings());
+        give(sink, 0, "/odd", encode(&PoseStamped::default()).unwrap());
+        std::thread::yield_now();
+    }
+}
+
+#[test]
+#[ignore = "needs a Python with rclpy, named by GRIDWEAVE_ROS_PYTHON"]
+fn a_topic_that_is_no_map_is_told_and_the_rest_goes_on() {
+    let (folder, domain) = (TempDir::new().unwrap(), Domain::new());
+    let mut source = domain.source("");
+    let _odd = rclpy(&domain, &["publish_strings", "/robot1/map"], folder.path());
+    assert!(warned(&mut source, "/robot1/map").contains("std_msgs/msg/String"));
+    let _robot = rclpy(&domain, &["publish_map", "/robot2/map", "20", "0"], folder.path());
+    let mut robots = Vec::new();
+    go_on(&mut source, "a map of robot2", |source| {
+        robots.extend(source.take_messages("map").iter().map(|message| message.robot().to_owned()));
+        robots.contains(&"robot2".to_owned())
+    });
+}

@@ -1,0 +1,112 @@
+"""Programs on the real Cyclone DDS, on this machine alone. What they do is the first argument; those after it are its own."""
+
+import json
+import math
+import os
+import sys
+import threading
+import time
+from dataclasses import dataclass, field
+
+os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain>
+<General><Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces><AllowMulticast>false</AllowMulticast></General>
+<Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery>
+</Domain></CycloneDDS>"""
+
+from cyclonedds.core import Policy, Qos
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import IdlStruct
+from cyclonedds.idl.types import float64, int32, sequence, uint32
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+
+@dataclass
+class Time(IdlStruct, typename="builtin_interfaces::msg::dds_::Time_"):
+    sec: int32 = 0
+    nanosec: uint32 = 0
+
+
+@dataclass
+class Header(IdlStruct, typename="std_msgs::msg::dds_::Header_"):
+    stamp: Time = field(default_factory=Time)
+    frame_id: str = ""
+
+
+@dataclass
+class Vector3(IdlStruct, typename="geometry_msgs::msg::dds_::Vector3_"):
+    x: float64 = 0.0
+    y: float64 = 0.0
+    z: float64 = 0.0
+
+
+@dataclass
+class Quaternion(IdlStruct, typename="geometry_msgs::msg::dds_::Quaternion_"):
+    x: float64 = 0.0
+    y: float64 = 0.0
+    z: float64 = 0.0
+    w: float64 = 1.0
+
+
+@dataclass
+class Transform(IdlStruct, typename="geometry_msgs::msg::dds_::Transform_"):
+    translation: Vector3 = field(default_factory=Vector3)
+    rotation: Quaternion = field(default_factory=Quaternion)
+
+
+@dataclass
+class TransformStamped(IdlStruct, typename="geometry_msgs::msg::dds_::TransformStamped_"):
+    header: Header = field(default_factory=Header)
+    child_frame_id: str = ""
+    transform: Transform = field(default_factory=Transform)
+
+
+@dataclass
+class TFMessage(IdlStruct, typename="tf2_msgs::msg::dds_::TFMessage_"):
+    transforms: sequence[TransformStamped] = field(default_factory=list)
+
+
+# With the encoding of ROS.
+RELIABLE = [Policy.Reliability.Reliable(duration(seconds=1)), Policy.DataRepresentation(use_cdrv0_representation=True)]
+LATCHED = Qos(*RELIABLE, Policy.Durability.TransientLocal, Policy.History.KeepLast(1))
+VOLATILE = Qos(*RELIABLE, Policy.Durability.Volatile, Policy.History.KeepLast(100))
+
+
+def transform(parent, child, x):
+    return TransformStamped(Header(Time(1, 0), parent), child, Transform(Vector3(x, 0.0, 0.0)))
+
+
+def tf(robot):
+    """Publishes where a robot is, on /tf and /tf_static, until standard input ends."""
+    participant = DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
+    static, moving = [
+        DataWriter(participant, Topic(participant, name, TFMessage), qos=qos)
+        for name, qos in (("rt/tf_static", LATCHED), ("rt/tf", VOLATILE))
+    ]
+    static.write(TFMessage([transform(f"{robot}/odom", f"{robot}/base_link", 2.0)]))
+    over = threading.Event()
+    threading.Thread(target=lambda: (sys.stdin.read(), over.set()), daemon=True).start()
+    while not over.wait(0.05):
+        moving.write(TFMessage([transform(f"{robot}/map", f"{robot}/odom", 1.0)]))
+
+
+def frames(count, longest):
+    """Looks at /tf_static until the frames of so many robots are there, and prints them as JSON."""
+    participant = DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
+    reader = DataReader(participant, Topic(participant, "rt/tf_static", TFMessage), qos=LATCHED)
+    seen, end = {}, time.monotonic() + float(longest)
+    while len(seen) < int(count):
+        if time.monotonic() > end:
+            sys.exit(f"there is only {seen}")
+        for message in reader.take(10):
+            for one in message.transforms:
+                at, turn = one.transform.translation, one.transform.rotation
+                yaw = math.atan2(2 * turn.w * turn.z, 1 - 2 * turn.z * turn.z)
+                seen[one.child_frame_id] = {"parent": one.header.frame_id, "x": at.x, "y": at.y, "yaw": yaw}
+        time.sleep(0.02)
+    json.dump(seen, sys.stdout)
+
+
+{f.__name__: f for f in (tf, frames)}[sys.argv[1]](*sys.argv[2:])
