@@ -16,6 +16,7 @@ pub(crate) use inferred_poses::InferredPoses;
 pub(crate) use merged_maps::{MapOrigin, MergedMaps};
 pub(crate) use mounts::NoTransform;
 pub(crate) use pose::{NoPose, pose_with_covariance};
+pub use scans::LidarPoses;
 pub(crate) use scans::{Scans, read_scan};
 pub(crate) use tag_positions::TagPositions;
 pub(crate) use tag_reader::{Measurement, TagReader};

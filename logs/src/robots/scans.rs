@@ -8,17 +8,24 @@ use gridweave_runtime::ros::{
 };
 use gridweave_runtime::stage::frame_of_robot;
 use nalgebra::{Isometry3, Vector3};
+use std::collections::BTreeMap;
 
 /// Transforms scans to the base frame, by the mounting poses of lidars.
 #[derive(Debug)]
 pub(crate) struct Scans {
     mounts: Mounts,
+    /// The poses of lidars on their robots that the user has set.
+    set: LidarPoses,
 }
 
+/// The poses of lidars on the bases of their robots, by robot: x, y, yaw, metres and radians.
+pub type LidarPoses = BTreeMap<String, [f64; 3]>;
+
 impl Scans {
-    /// Creates a transformer for robots with the base frame `base`, or one of the usual names.
-    pub(crate) fn new(base: Option<&str>) -> Self {
-        Self { mounts: Mounts::new(base) }
+    /// Creates a transformer for robots with the base frame `base`, or one of the usual names. The poses `set` take the
+    /// place of those in tf.
+    pub(crate) fn new(base: Option<&str>, set: LidarPoses) -> Self {
+        Self { mounts: Mounts::new(base), set }
     }
 
     /// Adds transforms whose frame names lack `prefix`.
@@ -30,17 +37,22 @@ impl Scans {
         }
     }
 
-    /// Whether tf says where the lidar with the frame `frame` is mounted on its robot.
+    /// Whether it is known where the lidar with the frame `frame` is mounted on its robot.
     pub(crate) fn knows_mount(&self, robot: &str, frame: &str) -> bool {
-        self.mounts.mount(robot, frame).is_ok()
+        self.set.contains_key(robot) || self.mounts.mount(robot, frame).is_ok()
     }
 
     /// Transforms a scan to the base frame, in the plane. The angles of a lidar mounted upside down run clockwise. A lidar
     /// whose [mount is unknown](Self::knows_mount) is taken to be the base.
     pub(crate) fn to_base_frame(&self, robot: &str, scan: LaserScan) -> RangeScan {
-        let mount = self.mounts.mount(robot, &scan.header.frame_id);
-        let (base, transform_base_lidar) =
-            mount.unwrap_or_else(|NoTransform| (scan.header.frame_id.clone(), Isometry3::identity()));
+        let frame = || scan.header.frame_id.clone();
+        let (base, transform_base_lidar) = match self.set.get(robot) {
+            Some(&[x, y, yaw]) => (frame(), Isometry3::new(Vector3::new(x, y, 0.0), Vector3::z() * yaw)),
+            None => {
+                let mount = self.mounts.mount(robot, &scan.header.frame_id);
+                mount.unwrap_or_else(|NoTransform| (frame(), Isometry3::identity()))
+            }
+        };
         let ahead = transform_base_lidar * Vector3::x();
         let is_upright = (transform_base_lidar * Vector3::z()).z >= 0.0;
         let turning = |angle: f32| if is_upright { f64::from(angle) } else { -f64::from(angle) };
@@ -103,7 +115,7 @@ mod tests {
         transform.rotation = Quaternion { x: r.i, y: r.j, z: r.k, w: r.w };
         let header = Header { frame_id: "base_link".into(), ..Default::default() };
         let mount = TransformStamped { header, child_frame_id: "laser".into(), transform };
-        let mut scans = Scans::new(None);
+        let mut scans = Scans::new(None, LidarPoses::new());
         scans.transforms("r1", true, &TFMessage { transforms: vec![mount] });
         scans
     }
@@ -132,11 +144,15 @@ mod tests {
 
     #[test]
     fn a_scan_in_the_base_frame_needs_no_mount_and_a_lidar_in_an_unknown_frame_is_the_base() {
-        let scans = Scans::new(None);
+        let scans = Scans::new(None, LidarPoses::from([("r2".to_owned(), [0.1, -0.2, 0.5])]));
         assert!(scans.knows_mount("r1", "r1/base_footprint") && !scans.knows_mount("r1", "r1/laser"));
         assert_eq!(scans.to_base_frame("r1", scan("r1/base_footprint")).x, 0.0);
         let found = scans.to_base_frame("r1", scan("r1/laser"));
         assert_eq!((found.x, found.y, found.yaw, &*found.header.frame_id), (0.0, 0.0, 0.0, "r1/laser"));
+        let found = scans.to_base_frame("r2", scan("r2/laser"));
+        assert!(scans.knows_mount("r2", "r2/laser"));
+        assert_eq!((found.x, found.y), (0.1, -0.2));
+        assert!((found.yaw - 0.5).abs() < 1e-12);
     }
 
     #[test]

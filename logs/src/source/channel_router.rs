@@ -1,9 +1,9 @@
 //! Routes messages to the output ports of their channels.
 
-use super::RobotMessages;
 use super::channel::{Route, Stamp};
 use super::derived::Derived;
 use super::latched::Latch;
+use super::{RobotMessages, RobotReading};
 use crate::names::rename_advice;
 use crate::robots::{CellValues, MapOrigin, MergedMaps, RobotChannels, Role};
 use crate::schemas::full_type_name;
@@ -35,15 +35,15 @@ impl ChannelRouter {
         robots: RobotTopics,
         channels: impl Iterator<Item = &'a Channel>,
         updates_maps: bool,
-        map_values: CellValues,
+        reading: RobotReading,
     ) -> Self {
         let roles = RobotChannels::new(robots.clone(), channels);
-        let derived = Derived::new(&robots, &roles, updates_maps, map_values);
+        let derived = Derived::new(&robots, &roles, updates_maps, &reading);
         Self {
             derived,
             roles,
             robots,
-            map_values,
+            map_values: reading.map_values,
             merged_maps: updates_maps.then(MergedMaps::default),
             undecided: Vec::new(),
             holds_undecided: true,
@@ -53,8 +53,8 @@ impl ChannelRouter {
     }
 
     /// Creates a router for channels that are added later. Whole maps are derived from map updates.
-    pub(super) fn live(robots: RobotTopics, map_values: CellValues) -> Self {
-        let mut router = Self::new(robots, std::iter::empty(), true, map_values);
+    pub(super) fn live(robots: RobotTopics, reading: RobotReading) -> Self {
+        let mut router = Self::new(robots, std::iter::empty(), true, reading);
         router.derived.expect_sensors();
         router.holds_undecided = false;
         router

@@ -1,10 +1,9 @@
 //! Routes the messages of robots that join and leave during a run.
 
-use super::RobotMessages;
 use super::channel::Stamp;
 use super::channel_router::ChannelRouter;
+use super::{RobotMessages, RobotReading};
 use crate::names::{NamedChannel, Renamed};
-use crate::robots::CellValues;
 use crate::robots::Role;
 use crate::tf::{is_static, tf_topic};
 use gridweave_runtime::message::Channel;
@@ -42,8 +41,8 @@ pub struct LiveMessage<'a> {
 impl LiveRouter {
     /// Creates a router without channels. `robots` are the topic patterns; messages on the topics `also`, in which
     /// `{robot}` matches one part of the path, are passed on unchanged.
-    pub fn new(robots: RobotTopics, also: Vec<String>, map_values: CellValues) -> Self {
-        Self { also, channels: Vec::new(), router: ChannelRouter::live(robots, map_values), renamed: Vec::new() }
+    pub fn new(robots: RobotTopics, also: Vec<String>, reading: RobotReading) -> Self {
+        Self { also, channels: Vec::new(), router: ChannelRouter::live(robots, reading), renamed: Vec::new() }
     }
 
     /// Adds a channel. Returns its number, which is the same for equal channels. Adding a channel may change which

@@ -14,7 +14,7 @@ pub mod topology_file;
 #[cfg(test)]
 mod tests;
 
-pub use crate::robots::CellValues;
+pub use crate::robots::{CellValues, LidarPoses};
 pub use live_router::{LiveMessage, LiveRouter};
 pub use stage::McapSource;
 
@@ -52,12 +52,24 @@ pub struct SourceParameters {
     /// (`occupancy`), as costmaps with costs around obstacles (`costmap`), or as two classes whatever their values
     /// (`two_classes`). Maps of another convention are sent as map servers write them.
     pub map_values: CellValues,
+    /// The poses of lidars on the bases of their robots, as `{ ROBOT = [X, Y, YAW] }`, metres and radians, in place of those
+    /// in tf.
+    pub lidars: LidarPoses,
     /// Start, in seconds after the first message of the logs. The latest map of each robot before that, and other
     /// latched messages, are sent at the start.
     #[schemars(range(min = 0.0))]
     pub start: f64,
     /// End, in seconds after the first message of the logs; the end of the logs if not set.
     pub end: Option<f64>,
+}
+
+/// How messages of robots are read that leave it open.
+#[derive(Clone, Debug, Default)]
+pub struct RobotReading {
+    /// How the values of maps' cells are read.
+    pub map_values: CellValues,
+    /// The poses of lidars on their robots; those of others are taken from tf.
+    pub lidars: LidarPoses,
 }
 
 impl SourceParameters {

@@ -1,13 +1,12 @@
 //! Routes each message of the logs to the port of its channel.
 
-use super::RobotMessages;
 use super::channel::Stamp;
 use super::channel_router::ChannelRouter;
 use super::latched::{Latch, LatchedMessage, LatchedMessages};
+use super::{RobotMessages, RobotReading};
 use crate::names::{Names, Renamed};
 use crate::reader::{Damage, LogFile, LogMessage};
 use crate::reader::{SupplementKind, describes_its_file, read_attachment, read_metadata};
-use crate::robots::CellValues;
 use crate::robots::Role;
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
 use std::collections::BTreeSet;
@@ -41,10 +40,10 @@ impl Router {
         names: Names,
         files: Arc<[LogFile]>,
         updates_maps: bool,
-        map_values: CellValues,
+        reading: RobotReading,
     ) -> Self {
         Self {
-            channels: ChannelRouter::new(robots, names.channels(), updates_maps, map_values),
+            channels: ChannelRouter::new(robots, names.channels(), updates_maps, reading),
             names,
             renamed: Vec::new(),
             by_number: vec![Vec::new(); files.len()],

@@ -2,7 +2,7 @@
 
 use super::latched::{LatchedMessages, Window};
 use super::router::Router;
-use super::{RobotMessages, SourceParameters};
+use super::{RobotMessages, RobotReading, SourceParameters};
 use crate::names::{self, Convention};
 use crate::reader::{LogFile, LogReader};
 use crate::robots::CellValues;
@@ -47,8 +47,9 @@ impl McapSource {
         let names_robots = rules.convention == Convention::ByRobot;
         // What keeps the names of the log keeps its bytes.
         let map_values = if names_robots { parameters.map_values } else { CellValues::Occupancy };
+        let reading = RobotReading { map_values, lidars: parameters.lidars };
         Ok(Self {
-            router: Router::new(context.robots.clone(), names, reader.files().clone(), names_robots, map_values),
+            router: Router::new(context.robots.clone(), names, reader.files().clone(), names_robots, reading),
             reader,
             window: Window::new(origin, parameters.start, parameters.end),
             latched: Some(LatchedMessages::default()),

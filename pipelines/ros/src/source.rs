@@ -10,7 +10,7 @@ use super::qos::Qos;
 use super::silence::Silence;
 use super::source_parameters::SourceParameters;
 use gridweave_logs::qos;
-use gridweave_logs::source::{LiveMessage, LiveRouter, RobotMessages};
+use gridweave_logs::source::{LiveMessage, LiveRouter, RobotMessages, RobotReading};
 use gridweave_runtime::message::{Channel, LogTime};
 use gridweave_runtime::stage::{Context, Output, Source, StageError, StageKind};
 use std::collections::{BTreeMap, BTreeSet};
@@ -84,11 +84,12 @@ impl RosSource {
         let duration = |seconds| Duration::try_from_secs_f64(seconds).unwrap_or_default();
         let inbox = Arc::new(Inbox::default());
         let events = Arc::clone(&inbox);
+        let reading = RobotReading { map_values: parameters.map_values, lidars: parameters.lidars };
         node.watch(move |on, entity, is_there| events.push(Event::Entity(on, entity, is_there), 0))?;
         Ok(Self {
             node,
             inbox,
-            router: LiveRouter::new(context.robots.clone(), parameters.also, parameters.map_values),
+            router: LiveRouter::new(context.robots.clone(), parameters.also, reading),
             definitions: Definitions::new(&parameters.definitions),
             keep_last: parameters.keep_last,
             topics: BTreeMap::new(),

@@ -3,7 +3,7 @@
 use super::connection::{Connection, LISTEN, ROUTER};
 use super::discovery_range::DiscoveryRange;
 use super::middleware::Middlewares;
-use gridweave_logs::source::CellValues;
+use gridweave_logs::source::{CellValues, LidarPoses};
 use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -54,6 +54,8 @@ pub struct SourceParameters {
     pub discovery_timeout: f64,
     /// How the values of maps' cells are read; see `mcap_source`.
     pub map_values: CellValues,
+    /// The poses of lidars on the bases of their robots, in place of those in tf; see `mcap_source`.
+    pub lidars: LidarPoses,
 }
 
 impl Default for SourceParameters {
@@ -74,6 +76,7 @@ impl Default for SourceParameters {
             update_period: 1.0,
             discovery_timeout: 10.0,
             map_values: CellValues::default(),
+            lidars: LidarPoses::new(),
         }
     }
 }

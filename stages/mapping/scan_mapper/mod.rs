@@ -18,11 +18,11 @@
 //! - [`ScanMap`]: the growing map.
 
 mod beams;
-mod drive;
 mod parameters;
 mod robot;
 mod scan_map;
 mod scan_odometry;
+mod slam_map;
 mod stage;
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,7 @@
 //! One robot with its scans and poses.
 
-use super::drive::{Drive, LostDrive};
 use super::scan_odometry::ScanOdometry;
+use super::slam_map::{LostScans, SlamMap};
 use super::{ScanBeams, ScanMap, ScanMapperParameters, TooLarge};
 use crate::shared::geometry::{Point2, Pose2, pose};
 use crate::shared::scan_grid::SnapshotMap;
@@ -19,9 +19,9 @@ enum Localization {
     /// By poses in its map.
     ByPoses(ScanMap),
     /// By odometry and the registration of scans.
-    ByOdometry(Drive),
+    ByOdometry(SlamMap),
     /// By the registration of scans alone.
-    ByScans(Drive, ScanOdometry),
+    ByScans(SlamMap, ScanOdometry),
 }
 
 /// Outcome of a scan.
@@ -107,22 +107,22 @@ impl Robot {
         std::mem::take(&mut self.kept_odometry)
     }
 
-    /// The drive whose poses are found by the registration of scans; `None` if the robot has other poses, or none yet.
-    fn drive(&self) -> Option<&Drive> {
+    /// The map whose poses are found by SLAM; `None` if the robot has other poses, or none yet.
+    fn slam_map(&self) -> Option<&SlamMap> {
         match &self.localization {
-            Localization::ByOdometry(drive) | Localization::ByScans(drive, _) => Some(drive),
+            Localization::ByOdometry(slam) | Localization::ByScans(slam, _) => Some(slam),
             Localization::NotYet | Localization::ByPoses(_) => None,
         }
     }
 
-    /// Whether its poses are found by the registration of scans.
-    pub(super) fn is_by_scans(&self) -> bool {
-        self.drive().is_some()
+    /// Whether its poses are found by SLAM.
+    pub(super) fn is_by_slam(&self) -> bool {
+        self.slam_map().is_some()
     }
 
     /// Pose in the map for a pose by odometry; `None` if the robot has other poses, or none yet.
     pub(super) fn in_map(&self, time: LogTime, odometry: &Pose2) -> Option<Pose2> {
-        self.drive().map(|drive| drive.in_map(time, odometry))
+        self.slam_map().map(|slam| slam.in_map(time, odometry))
     }
 
     /// Starts to register scans, along odometry if there is any, once no poses came for long enough or none will come.
@@ -131,10 +131,10 @@ impl Robot {
         let has_waited = |latest: LogTime| is_end || latest.seconds_since(first) >= parameters.wait_for_poses;
         match (self.odometry.latest_time(), self.waiting.back()) {
             (Some(latest), _) if has_waited(latest) => {
-                self.localization = Localization::ByOdometry(Drive::new(parameters));
+                self.localization = Localization::ByOdometry(SlamMap::new(parameters));
             }
             (None, Some((newest, _))) if has_waited(*newest) => {
-                self.localization = Localization::ByScans(Drive::new(parameters), ScanOdometry::default());
+                self.localization = Localization::ByScans(SlamMap::new(parameters), ScanOdometry::default());
             }
             _ => {}
         }
@@ -148,24 +148,24 @@ impl Robot {
         is_end: bool,
         mut outcome: impl FnMut(ScanOutcome),
     ) {
-        if let Localization::ByScans(drive, odometry) = &mut self.localization {
+        if let Localization::ByScans(slam, odometry) = &mut self.localization {
             for (time, scan) in self.waiting.drain(..) {
-                let at = odometry.pose(time, &scan, drive);
+                let at = odometry.pose(time, &scan, slam);
                 self.kept_odometry.push((time, at));
-                let is_due = drive.is_due(&at, parameters);
-                let is_matched = !is_due || drive.add(time, &at, &scan);
+                let is_due = slam.is_due(&at, parameters);
+                let is_matched = !is_due || slam.add(time, &at, &scan);
                 outcome(if is_matched { ScanOutcome::Used } else { ScanOutcome::NotMatched });
             }
         } else {
             self.draw_at_poses(parameters, is_end, outcome);
         }
-        let (Localization::ByOdometry(drive) | Localization::ByScans(drive, _)) = &mut self.localization else {
+        let (Localization::ByOdometry(slam) | Localization::ByScans(slam, _)) = &mut self.localization else {
             return;
         };
         if is_end {
-            drive.finish();
+            slam.finish();
         }
-        self.drawn = drive.times();
+        self.drawn = slam.times();
     }
 
     /// Adds the scans for whose beams poses are known, by a localizer or by odometry.
@@ -194,7 +194,7 @@ impl Robot {
                     }
                     drawn
                 }
-                Localization::ByOdometry(drive) => add_to_drive(drive, &self.odometry, time, &scan, parameters),
+                Localization::ByOdometry(slam) => add_to_slam(slam, &self.odometry, time, &scan, parameters),
             });
         }
     }
@@ -207,15 +207,15 @@ impl Robot {
         match &mut self.localization {
             Localization::NotYet => Ok(None),
             Localization::ByPoses(map) => Ok(map.snapshot()),
-            Localization::ByOdometry(drive) | Localization::ByScans(drive, _) => {
-                drive.draw().map(|()| drive.map().snapshot())
+            Localization::ByOdometry(slam) | Localization::ByScans(slam, _) => {
+                slam.draw().map(|()| slam.map().snapshot())
             }
         }
     }
 
     /// Whether its scans lie so seldom on each other that there is no map of them.
-    pub(super) fn lost(&self) -> Option<LostDrive> {
-        self.drive().and_then(Drive::lost)
+    pub(super) fn lost(&self) -> Option<LostScans> {
+        self.slam_map().and_then(SlamMap::lost)
     }
 }
 
@@ -237,20 +237,20 @@ fn draw_by_poses(
     }
 }
 
-fn add_to_drive(
-    drive: &mut Drive,
+fn add_to_slam(
+    slam: &mut SlamMap,
     odometry: &PoseTrack,
     time: LogTime,
     scan: &ScanBeams,
     parameters: &ScanMapperParameters,
 ) -> ScanOutcome {
     let Some(start) = pose_at(odometry, time, parameters) else { return ScanOutcome::NoPose };
-    if !drive.is_due(&start, parameters) {
+    if !slam.is_due(&start, parameters) {
         return ScanOutcome::Used;
     }
     // The relative poses of the beams of one scan are those of odometry.
     let still = without_motion(odometry, time, scan, &start, parameters);
-    if drive.add(time, &start, &still) { ScanOutcome::Used } else { ScanOutcome::NotMatched }
+    if slam.add(time, &start, &still) { ScanOutcome::Used } else { ScanOutcome::NotMatched }
 }
 
 /// The scan of a robot that stands still at `start`.

@@ -1,7 +1,7 @@
 //! Odometry from the scans alone, for robots that have no other.
 
 use super::ScanBeams;
-use super::drive::Drive;
+use super::slam_map::SlamMap;
 use crate::shared::geometry::{Pose2, pose};
 use gridweave_runtime::message::LogTime;
 
@@ -24,7 +24,7 @@ pub(super) struct ScanOdometry {
 
 impl ScanOdometry {
     /// The pose at a scan, in the frame of the first one.
-    pub(super) fn pose(&mut self, time: LogTime, scan: &ScanBeams, drive: &Drive) -> Pose2 {
+    pub(super) fn pose(&mut self, time: LogTime, scan: &ScanBeams, slam: &SlamMap) -> Pose2 {
         let Some((before, last)) = self.last else {
             self.last = Some((time, Pose2::identity()));
             return Pose2::identity();
@@ -35,7 +35,7 @@ impl ScanOdometry {
         let deviations =
             [0, 1].map(|axis| LEAST_DEVIATIONS[axis] + 0.5 * ACCELERATION[axis] * gap.min(LONGEST_GAP).powi(2));
         // Where the scan lies on no other one, the robot is taken to go on as it did.
-        let found = drive.locate(&guess, deviations, scan).unwrap_or(guess);
+        let found = slam.locate(&guess, deviations, scan).unwrap_or(guess);
         if gap > 0.0 {
             let moved = last.inv_mul(&found);
             self.velocity = [moved.translation.x, moved.translation.y, moved.rotation.angle()].map(|by| by / gap);

@@ -169,7 +169,7 @@ impl ScanMapper {
             ScanOutcome::TooLarge => output.warn(too_large(name)),
         });
         let Some([first, last]) = robot.drawn else { return Ok(()) };
-        let is_offline = self.parameters.mode == MappingMode::Offline && robot.is_by_scans();
+        let is_offline = self.parameters.mode == MappingMode::Offline && robot.is_by_slam();
         if !is_offline {
             for (time, odometry) in robot.take_odometry() {
                 send_pose(name, robot, time, &odometry, output)?;

@@ -39,7 +39,7 @@ pub(super) struct Excluded {
 
 /// Moves of one rotation of the scan: a square of cells.
 #[derive(Clone, Copy)]
-struct Node {
+struct Branch {
     rotation: usize,
     level: usize,
     /// Least move, cells.
@@ -91,7 +91,7 @@ pub(super) fn search(
         let sum = field.sum(level, cells, offset);
         if sum < least { f64::NEG_INFINITY } else { scale * f64::from(sum) - 0.5 * deviation }
     };
-    let is_excluded = |node: &Node| {
+    let is_excluded = |node: &Branch| {
         excluded.is_some_and(|excluded| {
             let place = mean.translation.vector + nalgebra::Vector2::from(node.offset.map(f64::from)) * CELL;
             let turn = wrap_angle(yaw + rotated[node.rotation].0 - excluded.pose.rotation.angle());
@@ -106,14 +106,14 @@ pub(super) fn search(
             for y in (-half[1]..=half[1]).step_by(1 << top) {
                 let bound = bound(rotation, top, [x, y]);
                 if bound > f64::NEG_INFINITY {
-                    open.push(Node { rotation, level: top, offset: [x, y], bound });
+                    open.push(Branch { rotation, level: top, offset: [x, y], bound });
                 }
             }
         }
     }
     // Depth first, the best last; ties in the order of the window, whatever the sort does.
     open.sort_by(|a, b| a.bound.total_cmp(&b.bound));
-    let mut best: Option<Node> = None;
+    let mut best: Option<Branch> = None;
     while let Some(node) = open.pop() {
         if best.is_some_and(|best| best.bound >= node.bound) {
             continue;
@@ -128,11 +128,11 @@ pub(super) fn search(
         let side = 1 << level;
         let mut parts = [[0, 0], [side, 0], [0, side], [side, side]].map(|[right, up]| {
             let offset = [node.offset[0] + right, node.offset[1] + up];
-            Node { rotation: node.rotation, level, offset, bound: bound(node.rotation, level, offset) }
+            Branch { rotation: node.rotation, level, offset, bound: bound(node.rotation, level, offset) }
         });
         parts.sort_by(|a, b| a.bound.total_cmp(&b.bound));
         let is_inside =
-            |node: &Node| node.offset[0] <= half[0] && node.offset[1] <= half[1] && node.bound > f64::NEG_INFINITY;
+            |node: &Branch| node.offset[0] <= half[0] && node.offset[1] <= half[1] && node.bound > f64::NEG_INFINITY;
         open.extend(parts.into_iter().filter(is_inside));
     }
     let best = best?;

@@ -7,9 +7,9 @@ mod scans;
 mod tags;
 mod updated_maps;
 
-use super::RobotMessages;
 use super::channel::Route;
-use crate::robots::{CellValues, PoseSource, RobotChannels, Role};
+use super::{RobotMessages, RobotReading};
+use crate::robots::{PoseSource, RobotChannels, Role};
 use gridweave_runtime::ros::{TFMessage, decode};
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
 use maps::DerivedMaps;
@@ -30,13 +30,13 @@ pub(super) struct Derived {
 impl Derived {
     /// Creates the derivations for channels with these roles. Whole maps are derived from map updates if
     /// `updates_maps`.
-    pub(super) fn new(robots: &RobotTopics, roles: &RobotChannels, updates_maps: bool, map_values: CellValues) -> Self {
+    pub(super) fn new(robots: &RobotTopics, roles: &RobotChannels, updates_maps: bool, reading: &RobotReading) -> Self {
         let base_frame = robots.tf.as_ref().map(|tf| tf.base_frame.clone());
         Self {
             poses: DerivedPoses::new(robots, roles),
-            scans: DerivedScans::new(base_frame.as_deref(), roles),
+            scans: DerivedScans::new(base_frame.as_deref(), roles, reading.lidars.clone()),
             tags: DerivedTags::new(base_frame.as_deref(), roles),
-            maps: DerivedMaps::new(updates_maps, map_values),
+            maps: DerivedMaps::new(updates_maps, reading.map_values),
             base_frame,
         }
     }

@@ -2,7 +2,7 @@
 
 use super::super::RobotMessages;
 use super::super::channel::Route;
-use crate::robots::{RobotChannels, Scans, read_scan};
+use crate::robots::{LidarPoses, RobotChannels, Scans, read_scan};
 use crate::tf::is_static;
 use gridweave_runtime::ros::TFMessage;
 use gridweave_runtime::stage::{Output, StageError};
@@ -11,17 +11,19 @@ use gridweave_runtime::stage::{Output, StageError};
 pub(super) struct DerivedScans {
     /// The mounting poses of lidars; `None` if no robot has, or may get, scans and no map.
     scans: Option<Scans>,
+    /// The poses of lidars that the user has set.
+    lidars: LidarPoses,
 }
 
 impl DerivedScans {
     /// Creates the derivation for robots with the base frame `base_frame`, or one of the usual names.
-    pub(super) fn new(base_frame: Option<&str>, roles: &RobotChannels) -> Self {
-        Self { scans: roles.scanned().next().map(|_| Scans::new(base_frame)) }
+    pub(super) fn new(base_frame: Option<&str>, roles: &RobotChannels, lidars: LidarPoses) -> Self {
+        Self { scans: roles.scanned().next().map(|_| Scans::new(base_frame, lidars.clone())), lidars }
     }
 
     /// Tracks the mounting poses of lidars before any channel with scans is known.
     pub(super) fn expect_sensors(&mut self, base_frame: Option<&str>) {
-        self.scans.get_or_insert_with(|| Scans::new(base_frame));
+        self.scans.get_or_insert_with(|| Scans::new(base_frame, self.lidars.clone()));
     }
 
     /// Learns the mounting poses of lidars.
@@ -49,7 +51,8 @@ impl DerivedScans {
         if !scans.knows_mount(&route.robot, frame) {
             output.warn(format!(
                 "tf has no transform from `{frame}`, the frame of `{topic}`, to the base of {}: the lidar is taken to be at \
-                 the base and to look ahead. If it does not, log its mount on /tf_static",
+                 the base and to look ahead. If it does not, log its mount on /tf_static, or set it: \
+                 `lidars` of the source, {{{0} = [X, Y, YAW]}}",
                 route.robot
             ));
         }

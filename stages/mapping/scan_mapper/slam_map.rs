@@ -1,4 +1,4 @@
-//! The drive of a robot that has odometry only, or nothing but scans: its poses are found by registration of its scans.
+//! The map of a robot that has odometry only, or nothing but scans: its poses are found by SLAM.
 
 use super::{BaseBeam, ScanBeams, ScanMap, ScanMapperParameters, TooLarge};
 use crate::mapping::slam::{ScanPoint, Trajectory, scan_points};
@@ -19,7 +19,7 @@ struct StillScan {
     beams: Vec<StillBeam>,
 }
 
-/// A beam, in single precision: all scans of a drive are kept.
+/// A beam, in single precision: all scans are kept.
 #[derive(Clone, Copy)]
 struct StillBeam {
     angle: f32,
@@ -28,7 +28,7 @@ struct StillBeam {
 }
 
 /// The scans of a robot with their poses, and the map that is drawn from them.
-pub(super) struct Drive {
+pub(super) struct SlamMap {
     trajectory: Trajectory,
     scans: Vec<StillScan>,
     map: ScanMap,
@@ -37,9 +37,9 @@ pub(super) struct Drive {
     first_unmatched: Option<LogTime>,
 }
 
-/// Scans of a drive that lie on no others.
+/// Scans that lie on no others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct LostDrive {
+pub(super) struct LostScans {
     /// How many.
     pub(super) unmatched: usize,
     /// Of how many.
@@ -48,7 +48,7 @@ pub(super) struct LostDrive {
     pub(super) since: LogTime,
 }
 
-impl Drive {
+impl SlamMap {
     pub(super) fn new(parameters: &ScanMapperParameters) -> Self {
         Self {
             trajectory: Trajectory::new(parameters.odometry_deviation),
@@ -163,11 +163,11 @@ impl Drive {
     }
 
     /// Whether so many scans lie on no others that there is no map of them.
-    pub(super) fn lost(&self) -> Option<LostDrive> {
+    pub(super) fn lost(&self) -> Option<LostScans> {
         let (unmatched, scans) = (self.trajectory.unmatched(), self.scans.len());
         let is_lost = scans >= LEAST_SCANS && unmatched as f64 > MAX_UNMATCHED * scans as f64;
         let since = self.first_unmatched.filter(|_| is_lost)?;
-        Some(LostDrive { unmatched, scans, since })
+        Some(LostScans { unmatched, scans, since })
     }
 }
 
