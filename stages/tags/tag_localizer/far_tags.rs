@@ -264,18 +264,12 @@ impl<'a> Estimate<'a> {
         // From the middle of the drive to the tag, and its mirror image.
         let offset = -mean;
         let mirrored = 2.0 * along * along.dot(&offset) - offset;
-        let mirror = Self { place: anchor + mean + mirrored, ..*self };
-        let mut found = [Some(mirror)];
-        // The calibration stays as it is.
-        let mut fixed = Calibration { information: Vector2::repeat(1e18), value: Vector2::zeros() };
-        fixed.value = calibration.value;
+        let mut mirror = Self { place: anchor + mean + mirrored, ..*self };
         for _ in 0..ITERATIONS {
-            let [Some(mirror)] = &mut found else { return 1.0 };
-            let equations = mirror.equations(&fixed);
+            let equations = mirror.equations(calibration);
             let Some(inverse) = equations.place.try_inverse() else { return 1.0 };
             mirror.place -= inverse * equations.place_gradient;
         }
-        let [Some(mirror)] = found else { return 1.0 };
         let apart = mirror.place - self.place;
         let distance = covariance.try_inverse().map_or(0.0, |inverse| apart.dot(&(inverse * apart)));
         if !(distance > DISTINCT * DISTINCT) || !mirror.place.iter().all(|value| value.is_finite()) {
