@@ -259,6 +259,9 @@ impl<'a> Estimate<'a> {
             let offset = ring.centre - anchor - mean;
             sum + offset * offset.transpose()
         });
+        if !spread.iter().all(|value| value.is_finite()) {
+            return 1.0;
+        }
         let axes = spread.symmetric_eigen();
         let along = axes.eigenvectors.column(axes.eigenvalues.imax()).into_owned();
         // From the middle of the drive to the tag, and its mirror image.
@@ -272,7 +275,9 @@ impl<'a> Estimate<'a> {
         }
         let apart = mirror.place - self.place;
         let distance = covariance.try_inverse().map_or(0.0, |inverse| apart.dot(&(inverse * apart)));
-        if !(distance > DISTINCT * DISTINCT) || !mirror.place.iter().all(|value| value.is_finite()) {
+        // It may have moved to the same place.
+        let is_another = distance > DISTINCT * DISTINCT && mirror.place.iter().all(|value| value.is_finite());
+        if !is_another {
             return 1.0;
         }
         1.0 / (1.0 + (self.cost(calibration) - mirror.cost(calibration)).exp())
