@@ -21,7 +21,7 @@ const LEAST_SIGHTING_STDDEV: f64 = 0.01;
 /// Largest distance at which a camera sees a tag, or a radio reads it, metres.
 const FARTHEST: f64 = 1000.0;
 /// Tags of long range are located again when there are so many times as many readings, and at the end.
-const MORE_READINGS: f64 = 1.2;
+const MORE_READINGS: f64 = 1.5;
 
 /// Localizes all tags of one robot from its poses and readings.
 #[derive(Clone, Debug)]

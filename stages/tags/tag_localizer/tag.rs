@@ -11,6 +11,8 @@ use nalgebra::Matrix2;
 
 /// A range that exceeds the reach by less than this many standard deviations is noise.
 pub(super) const REACH_TOLERANCE: f64 = 4.0;
+/// Fewer ranges from beyond the reach may be echoes, and do not show that a tag is of long range.
+const LEAST_FAR: u32 = 5;
 /// Factor by which the first grid of a tag with bearings only is larger, as its distance is unknown.
 const WIDER: f64 = 4.0;
 
@@ -40,7 +42,7 @@ pub(super) struct Tag {
 impl Tag {
     /// Whether most of its ranges are from beyond the reach of a tag of short range.
     pub(super) fn is_far(&self) -> bool {
-        self.beyond > self.groups.readings()
+        self.beyond >= LEAST_FAR && self.beyond > self.groups.readings()
     }
 
     /// Adds a range: to those from beyond the reach, or to the others.

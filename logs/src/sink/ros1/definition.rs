@@ -146,6 +146,8 @@ fn is_built_in(name: &str) -> bool {
             | "duration"
             | "byte"
             | "char"
+            // ROS 1 has no such type: whoever encodes messages refuses it.
+            | "wstring"
     )
 }
 
