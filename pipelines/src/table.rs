@@ -165,6 +165,14 @@ mod tests {
     }
 
     #[test]
+    fn a_line_end_within_a_cell_does_not_look_like_another_row() {
+        let mut table = Table::new(["robot", "x"]);
+        table.row(["a\nb".into(), "1".into()]);
+        assert_eq!(table.to_string().lines().count(), 2);
+        assert!(table.to_string().contains("a\\u000ab"));
+    }
+
+    #[test]
     fn markdown_and_csv_hold_the_same_cells() {
         let mut table = Table::new(["robot", "why"]);
         table.row(["r1".into(), "a|b, \"c\"".into()]);

@@ -15,11 +15,13 @@
 
 mod bags;
 mod cdr;
+mod databases;
 mod definitions;
 mod input;
 mod map_files;
 mod mcap_logs;
 mod pipelines;
+mod ros1_bags;
 mod target;
 
 use peak_alloc::PeakAlloc;

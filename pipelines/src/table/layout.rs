@@ -85,7 +85,8 @@ impl Column {
     /// Lines of a cell within this column.
     fn parts(&self, cell: &str) -> Vec<String> {
         match display_width(cell) <= self.width {
-            true => vec![cell.to_owned()],
+            // A line end within a name would look like another row.
+            true => vec![cell.replace('\n', "\\u000a")],
             false => wrap_words(cell, self.width),
         }
     }

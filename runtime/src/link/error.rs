@@ -1,7 +1,10 @@
 //! Errors of a link over shared memory.
 
+use rustix::io::Errno;
+use rustix::process::{Resource, getrlimit};
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use std::fs;
 
 /// An error while a link over shared memory was created or used.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
@@ -52,6 +55,12 @@ pub enum LinkError {
         /// What was being done.
         doing: String,
     },
+    /// This program has opened as many files as it may.
+    #[error("cannot {doing}: this program has opened as many files as it may; raise the limit with `ulimit -n`")]
+    Files {
+        /// What was being done.
+        doing: String,
+    },
     /// The link has the maximum number of external senders, or of observers.
     #[error("cannot {doing} {link}: {most} programs, the maximum, do so already; stop one of them")]
     Crowded {
@@ -67,6 +76,17 @@ pub enum LinkError {
     Stopped,
 }
 
+/// The number of files that iceoryx2 opens for one operation, at most, and has closed again when it reports the error.
+const FILES_OF_ONE: u64 = 16;
+
+/// Whether this program can open hardly any more files, which iceoryx2 does not distinguish from other errors.
+fn are_files_used_up() -> bool {
+    match fs::read_dir("/proc/self/fd") {
+        Ok(open) => getrlimit(Resource::Nofile).current.is_some_and(|most| open.count() as u64 + FILES_OF_ONE > most),
+        Err(error) => error.raw_os_error() == Some(Errno::MFILE.raw_os_error()),
+    }
+}
+
 /// What fixes most errors of shared memory.
 const HELP: &str = "check that /dev/shm has free space and is writable";
 
@@ -80,6 +100,9 @@ impl LinkError {
     /// An error of iceoryx2 while `doing` something.
     pub(crate) fn shared(doing: impl Into<String>) -> impl FnOnce(&dyn fmt::Debug) -> Self {
         let doing = doing.into();
-        move |cause| Self::Shared { doing, cause: format!("{cause:?}") }
+        move |cause| match are_files_used_up() {
+            true => Self::Files { doing },
+            false => Self::Shared { doing, cause: format!("{cause:?}") },
+        }
     }
 }

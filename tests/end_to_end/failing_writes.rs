@@ -1,0 +1,93 @@
+//! Writes that fail, at each place in turn, and files that cannot be opened: what was there before stays, the command fails, and it
+//! names the cause.
+//!
+//! A limit of the size of files (`ulimit -f`) makes the write fail that crosses it, as on a full disk. It is raised block by block
+//! until all fits.
+
+use crate::support::{Ended, LogBuilder, TestMap, gridweave_program, start_program};
+use gridweave_logs::map_file::{self, GridMap};
+use gridweave_logs::reader::LogFile;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// Runs `gridweave` with so many blocks of 512 bytes as the limit of each file that it writes.
+fn run_limited(folder: &Path, blocks: usize, args: &[&str]) -> Ended {
+    let limited = "trap '' XFSZ; ulimit -f \"$1\"; shift; exec \"$@\"";
+    let (blocks, program) = (blocks.to_string(), gridweave_program().to_str().unwrap());
+    let args = [&["-c", limited, "sh", &blocks, program], args].concat();
+    start_program("sh".as_ref(), folder, &args, &[]).wait()
+}
+
+/// Runs a command with each limit until all that it writes fits. Each time before, its `output` says something else, which stays
+/// if the command fails.
+#[track_caller]
+fn fail_at_each_block(folder: &Path, args: &[&str], outputs: &[&str], most: usize) {
+    let earlier = b"what was there before";
+    for blocks in 0..most {
+        for output in outputs {
+            fs::write(folder.join(output), earlier).unwrap();
+        }
+        let ended = run_limited(folder, blocks, args);
+        assert!(!ended.text().contains("panicked"), "{blocks} blocks: {ended:#?}");
+        // Maps that cannot be merged are no failure.
+        if [0, 3].contains(&ended.status) {
+            assert!(blocks > 2, "{ended:#?}");
+            assert!(outputs.iter().all(|output| fs::read(folder.join(output)).unwrap() != earlier));
+            return;
+        }
+        assert_eq!(ended.status, 1, "{blocks} blocks: {ended:#?}");
+        let is_named = outputs.iter().chain(&["summary.json"]).any(|output| ended.stderr.contains(output));
+        assert!(is_named, "{blocks} blocks: {ended:#?}");
+        for output in outputs {
+            assert_eq!(fs::read(folder.join(output)).unwrap(), earlier, "{blocks} blocks: {ended:#?}");
+        }
+    }
+    panic!("{most} blocks are not enough");
+}
+
+#[test]
+fn a_log_whose_writing_fails_at_any_block_leaves_the_earlier_one() {
+    let folder = TempDir::new().unwrap();
+    let input = folder.path().join("input.mcap");
+    let mut log = LogBuilder::new(&input);
+    for number in 0..3 {
+        // Bytes that do not compress.
+        let bytes: Vec<u8> =
+            (0..1500_u64).map(|at| ((at + 7919 * number).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 56) as u8).collect();
+        log.raw(number as f64, "/other", "std_msgs/msg/String", &bytes);
+    }
+    log.finish();
+    fail_at_each_block(folder.path(), &["convert", "input.mcap", "-o", "output.mcap"], &["output.mcap"], 60);
+    assert!(LogFile::open(folder.path().join("output.mcap")).unwrap().damage().is_empty());
+}
+
+#[test]
+fn map_files_whose_writing_fails_at_any_block_leave_the_earlier_ones() {
+    let folder = TempDir::new().unwrap();
+    let TestMap { info, mut cells } = TestMap::filled(60, 50, 0.05, 0);
+    cells[..3 * 60].fill(100);
+    let map = GridMap { info, cells };
+    for name in ["a.yaml", "b.yaml"] {
+        map_file::save(&folder.path().join(name), &map).unwrap();
+    }
+    let args = ["merge", "a.yaml", "b.yaml", "-o", "merged.yaml"];
+    fail_at_each_block(folder.path(), &args, &["merged.yaml", "merged.pgm"], 60);
+}
+
+#[test]
+fn a_run_without_free_file_descriptors_says_so() {
+    let folder = TempDir::new().unwrap();
+    let mut log = LogBuilder::new(&folder.path().join("input.mcap"));
+    log.map(0.0, "robot1", &TestMap::room()).map(0.0, "robot2", &TestMap::room());
+    log.finish();
+    let limited = "ulimit -n \"$1\"; shift; exec \"$@\"";
+    let program = gridweave_program().to_str().unwrap();
+    let merge = ["merge", "input.mcap", "-o", "output.mcap", "--engine", "threads-ipc"];
+    for descriptors in ["12", "40", "100"] {
+        let args = [&["-c", limited, "sh", descriptors, program], &merge[..]].concat();
+        let ended = start_program("sh".as_ref(), folder.path(), &args, &[]).wait();
+        ended.assert(1, &["ulimit -n"]);
+        assert!(!folder.path().join("output.mcap").exists());
+    }
+}
