@@ -28,6 +28,8 @@ mod reader;
 mod receiver;
 mod state;
 mod submessage;
+#[cfg(test)]
+mod tests;
 mod writer;
 
 pub(crate) use cursor::{Cursor, push_text};

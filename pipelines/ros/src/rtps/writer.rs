@@ -12,6 +12,10 @@ use std::time::{Duration, Instant};
 const FIRST_HEARTBEAT: Duration = Duration::from_millis(50);
 const LONGEST_HEARTBEAT: Duration = Duration::from_secs(1);
 
+/// What is sent again is followed by a heartbeat at once, but no more often than this: where samples of some size never arrive, no
+/// more is sent than that.
+const REPAIR_INTERVAL: Duration = Duration::from_millis(10);
+
 /// A writer.
 #[derive(Debug)]
 pub(crate) struct Writer {
@@ -26,6 +30,8 @@ pub(crate) struct Writer {
     heartbeats: u32,
     interval: Duration,
     due: Option<Instant>,
+    /// When the next heartbeat after a repair may be sent.
+    next_repair: Option<Instant>,
 }
 
 #[derive(Debug)]
@@ -58,6 +64,7 @@ impl Writer {
             heartbeats: 0,
             interval: FIRST_HEARTBEAT,
             due: None,
+            next_repair: None,
         }
     }
 
@@ -155,8 +162,7 @@ impl Writer {
             self.interval = FIRST_HEARTBEAT;
             let is_behind = self.readers.get(&reader).is_some_and(|known| known.acknowledged < self.last);
             if is_behind || known_nothing(missing) {
-                outgoing.extend(self.heartbeat_for(&reader));
-                self.due = Some(now + self.interval);
+                outgoing.extend(self.heartbeat_after_repair(&reader, now));
             }
         }
         outgoing
@@ -189,8 +195,7 @@ impl Writer {
         let mut outgoing: Vec<Outgoing> =
             content.into_iter().map(|content| Outgoing { to: to.clone(), content }).collect();
         self.interval = FIRST_HEARTBEAT;
-        outgoing.extend(self.heartbeat_for(&reader));
-        self.due = Some(now + self.interval);
+        outgoing.extend(self.heartbeat_after_repair(&reader, now));
         outgoing
     }
 
@@ -216,6 +221,17 @@ impl Writer {
         self.interval = if is_first { FIRST_HEARTBEAT } else { (self.interval * 2).min(LONGEST_HEARTBEAT) };
         self.due = (!lacking.is_empty()).then(|| now + self.interval);
         lacking.iter().filter_map(|guid| self.heartbeat_for(guid)).collect()
+    }
+
+    /// A heartbeat at once, or else when it may be sent.
+    fn heartbeat_after_repair(&mut self, guid: &Guid, now: Instant) -> Option<Outgoing> {
+        if let Some(next) = self.next_repair.filter(|next| *next > now) {
+            self.due = Some(self.due.map_or(next, |due| due.min(next)));
+            return None;
+        }
+        self.next_repair = Some(now + REPAIR_INTERVAL);
+        self.due = Some(now + self.interval);
+        self.heartbeat_for(guid)
     }
 
     fn heartbeat_for(&mut self, guid: &Guid) -> Option<Outgoing> {

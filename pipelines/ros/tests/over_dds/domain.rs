@@ -2,7 +2,7 @@
 
 use gridweave_ros::{sink, source};
 use gridweave_runtime::message::{FixedText, LogTime, Message, MessageFlags, MessageHeader};
-use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, encode};
+use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, PoseStamped, encode};
 use gridweave_runtime::stage::{Context, InputWire, StageHarness};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -95,4 +95,10 @@ pub(crate) fn go_on(source: &mut StageHarness, what: &str, mut holds: impl FnMut
         source.node().wait(Duration::from_millis(20));
         assert!(source.node().advance().unwrap());
     }
+}
+
+/// Where the robots are by the poses that have come: x of each.
+pub(crate) fn poses(source: &mut StageHarness) -> Vec<f64> {
+    let messages = source.take_messages("pose");
+    messages.iter().filter_map(|message| Some(message.decode::<PoseStamped>().ok()?.pose.position.x)).collect()
 }

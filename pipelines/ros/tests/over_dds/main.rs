@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod both;
 #[path = "../over_zenoh/command.rs"]
 #[allow(dead_code)]
 mod command;
@@ -9,3 +10,6 @@ mod domain;
 mod quality;
 mod ros_nodes;
 mod stages;
+#[path = "../over_zenoh/wire.rs"]
+#[allow(dead_code)]
+mod wire;

@@ -1,6 +1,6 @@
 //! A source among nodes that publish as robots do, and a sink that they are.
 
-use crate::domain::{Domain, give, go_on, map, sent};
+use crate::domain::{Domain, give, go_on, map, poses, sent};
 use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage, encode};
 
 const MAP: &[(&str, &str)] = &[(OccupancyGrid::NAME, "/robot1/map")];
@@ -74,24 +74,18 @@ fn messages_come_in_their_order_and_none_is_missing() {
     let mut first = Vec::new();
     go_on(&mut source, "a pose", |source| {
         give(&mut robot, 1, "/robot1/pose", pose(0));
-        first = sent_now(source);
+        first = poses(source);
         !first.is_empty()
     });
     (1..=1000).for_each(|number| give(&mut robot, 1, "/robot1/pose", pose(number)));
     let mut all = first;
     go_on(&mut source, "the last pose", |source| {
-        all.extend(sent_now(source));
+        all.extend(poses(source));
         all.last() == Some(&1000.0)
     });
     all.dedup();
     let numbers: Vec<f64> = (0..=1000).map(f64::from).collect();
     assert_eq!(all, numbers);
-}
-
-/// The positions of the poses that have come.
-fn sent_now(source: &mut gridweave_runtime::stage::StageHarness) -> Vec<f64> {
-    let messages = source.take_messages("pose");
-    messages.iter().filter_map(|message| Some(message.decode::<PoseStamped>().ok()?.pose.position.x)).collect()
 }
 
 #[test]
