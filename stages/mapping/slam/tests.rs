@@ -124,9 +124,9 @@ fn what_was_registered_can_be_located_without_adding_it() {
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let mut trajectory = Trajectory::new(0.1);
     assert_eq!(trajectory.locate(&Pose2::identity(), [0.1; 2], &[]), None);
-    for step in 0..4 {
+    for (step, at) in truth.iter().enumerate().take(4) {
         let moved = if step == 0 { Pose2::identity() } else { pose(STEP, 0.0, 0.0) };
-        trajectory.add(&moved, scan(&walls, &truth[step], &mut random));
+        trajectory.add(&moved, scan(&walls, at, &mut random));
     }
     let at = truth[3] * pose(0.2, 0.05, 0.1);
     let found = trajectory.locate(&Pose2::identity(), [0.1; 2], &scan(&walls, &at, &mut random)).unwrap();
