@@ -8,6 +8,7 @@ use super::outgoing::{Content, Outgoing};
 use super::submessage::{Body, Submessage};
 use super::writer::is_later;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::net::SocketAddrV4;
 use std::time::{Duration, Instant};
 
@@ -195,21 +196,22 @@ impl MatchedWriter {
         if sequence < self.next || self.held.contains_key(&sequence) {
             return None;
         }
-        if !self.assemblies.contains_key(&sequence) {
-            self.assemblies.insert(sequence, Assembly::new(sizes.0, sizes.1)?);
-            if self.assemblies.len() > ASSEMBLIES {
-                // Of what is not sent again the last counts, and of all else the first that is missing.
-                match self.is_reliable {
-                    true => self.assemblies.pop_last(),
-                    false => self.assemblies.pop_first(),
-                };
-            }
-        }
-        let assembly = self.assemblies.get_mut(&sequence)?;
+        let assembly = match self.assemblies.entry(sequence) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(unknown) => unknown.insert(Assembly::new(sizes.0, sizes.1)?),
+        };
         assembly.add(first, sizes, payload);
-        let sample = assembly.sample()?;
-        self.assemblies.remove(&sequence);
-        Some(sample)
+        let sample = assembly.sample();
+        if sample.is_some() {
+            self.assemblies.remove(&sequence);
+        } else if self.assemblies.len() > ASSEMBLIES {
+            // Of what is not sent again the last counts, and of all else the first that is missing.
+            match self.is_reliable {
+                true => self.assemblies.pop_last(),
+                false => self.assemblies.pop_first(),
+            };
+        }
+        sample
     }
 
     /// Samples before this one do not come any more.
@@ -258,7 +260,7 @@ impl MatchedWriter {
     /// and with 1 when its next heartbeat is due, after three seconds. So both are asked in turn.
     fn ask(&mut self, own: Guid, writer: Guid) -> Outgoing {
         self.requests = self.requests.wrapping_add(1);
-        let nothing = NumberSet::new(i64::from(self.requests % 2 == 0), []);
+        let nothing = NumberSet::new(i64::from(self.requests.is_multiple_of(2)), []);
         let message = Message::new(own.prefix).to(writer.prefix);
         let message = message.acknack(own.entity, writer.entity, &nothing, self.requests, false);
         Outgoing { to: self.addresses.clone(), content: Content::Message(message) }
