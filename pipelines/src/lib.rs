@@ -28,10 +28,13 @@ pub mod table;
 mod temporary;
 mod terminal;
 mod text_wrapping;
+mod verb;
 
-use clap::Parser;
+pub use verb::Verb;
+
+use clap::{CommandFactory, FromArgMatches};
 use gridweave_runtime::pipeline::PipelineErrors;
-use gridweave_runtime::stage::StageKind;
+use gridweave_runtime::stage::{Registry, StageKind};
 use status::{BadUse, Status};
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -39,14 +42,27 @@ use std::process::ExitCode;
 /// Runs the command line with the stage kinds of Gridweave and the given ones; of two kinds with one name the given one counts.
 /// The exit status is 0 if all is done, 1 if it failed, 2 for bad use, and 3 if something could not be merged.
 pub fn command(kinds: impl IntoIterator<Item = StageKind>) -> ExitCode {
-    command_with(kinds, |_, _| {})
+    command_with(kinds, &[], |_, _| {})
 }
 
-/// Runs the command line as [`command`] does, and calls `on_warning` for each warning of this process, with its module and
-/// its text.
-pub fn command_with(kinds: impl IntoIterator<Item = StageKind>, on_warning: fn(&str, &str)) -> ExitCode {
+/// Runs the command line as [`command`] does, with further verbs, and calls `on_warning` for each warning of this process, with its
+/// module and its text.
+pub fn command_with(
+    kinds: impl IntoIterator<Item = StageKind>,
+    verbs: &[Verb],
+    on_warning: fn(&str, &str),
+) -> ExitCode {
     let registry = shipped::registry(kinds);
-    match cli::Cli::parse().execute(&registry, on_warning) {
+    if std::env::args().any(|argument| argument == "--ros-args") {
+        terminal::eprint_line(
+            "error: `--ros-args` is for ROS programs. Here parameters are `--set STAGE.PARAMETER=VALUE`, topics of robots are named in \
+             `[robots]` of the pipeline, those that are published by `--set STAGE.rename='[\"/map=/fleet/map\"]'`, and the node by \
+             `--set STAGE.node=NAME`",
+        );
+        return ExitCode::from(2);
+    }
+    let command = verbs.iter().fold(cli::Cli::command(), |command, verb| command.subcommand(verb.command()));
+    match execute(&command.get_matches(), &registry, verbs, on_warning) {
         Ok(Status::Done) => ExitCode::SUCCESS,
         Ok(Status::BadUse) => ExitCode::from(2),
         Ok(Status::Failed) => ExitCode::from(1),
@@ -59,4 +75,19 @@ pub fn command_with(kinds: impl IntoIterator<Item = StageKind>, on_warning: fn(&
             ExitCode::from(if error.is::<BadUse>() || error.is::<PipelineErrors>() { 2 } else { 1 })
         }
     }
+}
+
+fn execute(
+    matches: &clap::ArgMatches,
+    registry: &Registry,
+    verbs: &[Verb],
+    on_warning: fn(&str, &str),
+) -> anyhow::Result<Status> {
+    if let Some((name, of_verb)) = matches.subcommand()
+        && let Some(verb) = verbs.iter().find(|verb| verb.name == name)
+    {
+        terminal::print(verb.execute(of_verb)?)?;
+        return Ok(Status::Done);
+    }
+    cli::Cli::from_arg_matches(matches)?.execute(registry, on_warning)
 }

@@ -6,7 +6,7 @@
 //!
 //! ```no_run
 //! fn main() -> std::process::ExitCode {
-//!     gridweave::command_with(gridweave_ros::kinds(), gridweave_ros::bridge::on_log_warning)
+//!     gridweave::command_with(gridweave_ros::kinds(), &[gridweave_ros::doctor()], gridweave_ros::bridge::on_log_warning)
 //! }
 //! ```
 //!
@@ -24,6 +24,7 @@ mod dds_names;
 mod dds_node;
 mod definitions;
 mod discovery_range;
+mod doctor;
 mod inbox;
 pub mod key_expression;
 pub mod liveliness;
@@ -41,6 +42,7 @@ pub mod source;
 mod source_parameters;
 mod zenoh_node;
 
+pub use doctor::doctor;
 use gridweave_runtime::stage::StageKind;
 
 /// The stage kinds of this crate.

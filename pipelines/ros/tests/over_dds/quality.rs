@@ -1,5 +1,6 @@
 //! What does not fit is told, once, and the rest goes on.
 
+use crate::command::{GRIDWEAVE, Running, run};
 use crate::domain::{Domain, give, map, sent, warned};
 use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage, encode};
 
@@ -31,4 +32,56 @@ fn a_domain_with_nobody_in_it_is_told() {
     let mut source = domain.source("discovery_timeout = 0.2");
     let text = warned(&mut source, "nobody publishes over DDS");
     assert!(text.contains(&format!("domain {}", domain.number())), "{text}");
+}
+
+/// What the doctor says, once it says these words.
+#[track_caller]
+fn doctor(domain: &Domain, words: &str) -> String {
+    let folder = tempfile::TempDir::new().unwrap();
+    let number = format!("domain={}", domain.number());
+    let settings = ["middleware=dds", "discovery_range=localhost", &number].into_iter().flat_map(|set| ["--set", set]);
+    let arguments: Vec<&str> = ["doctor", "--seconds", "0.5"].into_iter().chain(settings).collect();
+    let until = std::time::Instant::now() + crate::domain::WATCHDOG;
+    loop {
+        let text = run(GRIDWEAVE, &arguments, folder.path());
+        if text.contains(words) {
+            return text;
+        }
+        assert!(std::time::Instant::now() < until, "{text}");
+    }
+}
+
+#[test]
+fn the_doctor_says_who_publishes_what_and_what_is_missing_for_a_merge() {
+    let domain = Domain::new();
+    let mut first = domain.sink("slam_a", &[(OccupancyGrid::NAME, "/robot1/map")]);
+    give(&mut first, 0, "/robot1/map", map(20, 1));
+    let text = doctor(&domain, "robot1 has a map");
+    for words in ["/robot1/map", OccupancyGrid::NAME, "reliable, transient local", "/slam_a", "DDS", "there are 1"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let mut second = domain.sink("slam_b", &[(OccupancyGrid::NAME, "/robot2/map")]);
+    give(&mut second, 0, "/robot2/map", map(20, 1));
+    let text = doctor(&domain, "robot2 has a map");
+    assert!(text.contains("gridweave-ros run live_ros.toml"), "{text}");
+}
+
+#[test]
+fn the_doctor_says_how_to_name_maps_on_other_topics() {
+    let domain = Domain::new();
+    let topics = [(OccupancyGrid::NAME, "/fleet/a/map"), (OccupancyGrid::NAME, "/fleet/b/map")];
+    let mut robots = domain.sink("slam", &topics);
+    give(&mut robots, 0, "/fleet/a/map", map(20, 1));
+    give(&mut robots, 1, "/fleet/b/map", map(20, 1));
+    let text = doctor(&domain, "/fleet/b/map");
+    assert!(text.contains("map = \"/fleet/{robot}/map\""), "{text}");
+}
+
+#[test]
+fn arguments_of_ros_are_refused_with_what_to_write_instead() {
+    let folder = tempfile::TempDir::new().unwrap();
+    let mut running =
+        Running::start(GRIDWEAVE, &["run", "a.toml", "--ros-args", "-r", "/map:=/b"], folder.path(), "log");
+    running.end_with(2);
+    assert!(running.errors().contains("--set STAGE.rename"), "{}", running.errors());
 }

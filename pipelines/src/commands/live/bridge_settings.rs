@@ -25,7 +25,10 @@ pub(super) fn connect_parameters(endpoints: &[String]) -> toml::Table {
 }
 
 /// Parses settings of the form PARAMETER=VALUE.
-pub(super) fn settings(set: &[String]) -> Result<toml::Table> {
+///
+/// # Errors
+/// One has another form.
+pub(crate) fn settings(set: &[String]) -> Result<toml::Table> {
     let mut parameters = toml::Table::new();
     for setting in set {
         let wrong = || BadUse(format!("`{setting}` is not a setting: write it as PARAMETER=VALUE"));

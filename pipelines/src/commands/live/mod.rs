@@ -14,6 +14,7 @@ mod top;
 mod view;
 
 pub(crate) use bridge::{BridgeArgs, bridge};
+pub(crate) use bridge_settings::settings;
 pub(crate) use play::{PlayArgs, play};
 pub(crate) use record::{RecordArgs, record};
 pub(crate) use tap::{TapArgs, tap};
