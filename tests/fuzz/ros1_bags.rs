@@ -24,7 +24,7 @@ uint8 value
 ";
 
 fn fields(fields: &[(&str, &[u8])]) -> Vec<u8> {
-    let field = |(name, value): &(&str, &[u8])| {
+    let field = |&(name, value): &(&str, &[u8])| {
         let length = (name.len() + 1 + value.len()) as u32;
         [&length.to_le_bytes(), name.as_bytes(), b"=", value].concat()
     };
