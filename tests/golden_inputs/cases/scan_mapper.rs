@@ -15,7 +15,7 @@ pub(super) fn cases() -> Vec<Case> {
         Case::new("scan_mapper", "a_robot_that_turns", |log| drive(log, "pose", "robot1/map", 1.0)),
         // Wheels that are thought to be 4 % larger than they are.
         Case::new("scan_mapper", "odometry_alone", |log| drive(log, "odometry", "robot1/odom", 1.04)),
-        Case::new("scan_mapper", "nothing_to_draw", |log| {
+        Case::new("scan_mapper", "scans_alone", |log| {
             let odd = RangeScan { angle_increment: f64::NAN, ..scan(1.0) };
             log.message(1.0, "/robot1/scans", &odd);
             log.message(2.0, "/robot1/scans", &scan(2.0));
