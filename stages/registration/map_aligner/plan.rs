@@ -183,7 +183,8 @@ impl MergePlan {
         if self.has_alike(&found) {
             let (shift, turn) = found.second_best_change;
             let reason = format!(
-                "on the merged map of {} robots two poses fit, the second {:.0} % as well, {shift:.1} m and {:.0} degrees away",
+                "on the merged map of {} robots a second pose fits {:.0} % as well, {shift:.1} m and {:.0} degrees away: the maps do not decide \
+                 which is right",
                 count_a + count_b - 1,
                 100.0 * found.second_best_share,
                 turn.to_degrees(),
