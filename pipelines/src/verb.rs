@@ -4,14 +4,15 @@ use crate::commands::live::settings;
 use anyhow::Result;
 use std::time::Duration;
 
-/// A verb that a program adds to the command line. It takes the parameters of a stage, and looks at something for a while.
+/// A verb that a program adds to the command line: it takes the parameters of a stage, observes something for a while, and
+/// prints what it has found.
 #[derive(Clone, Copy, Debug)]
 pub struct Verb {
     /// Its name.
     pub name: &'static str,
     /// What it does, in a sentence.
     pub about: &'static str,
-    /// Looks for so long with these parameters, and gives what to print.
+    /// Observes for the given time with these parameters. Returns the text to print.
     pub look: fn(toml::Table, Duration) -> Result<String>,
 }
 
@@ -21,7 +22,7 @@ struct VerbArgs {
     /// A parameter, as in a pipeline
     #[arg(long, value_name = "PARAMETER=VALUE")]
     set: Vec<String>,
-    /// So long it looks, seconds
+    /// Time to listen, seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0)]
     seconds: f64,
 }
@@ -32,7 +33,7 @@ impl Verb {
         <VerbArgs as clap::Args>::augment_args(clap::Command::new(self.name).about(self.about))
     }
 
-    /// Does what it does, and gives what to print.
+    /// Parses the arguments and runs the verb. Returns the text to print.
     ///
     /// # Errors
     /// The parameters are wrong, or the network cannot be joined.

@@ -25,6 +25,8 @@ mod scan_odometry;
 mod slam_map;
 mod stage;
 #[cfg(test)]
+mod test_drive;
+#[cfg(test)]
 mod tests;
 
 pub use beams::{BaseBeam, ScanBeams};

@@ -6,6 +6,13 @@ use nalgebra::{Matrix2, Vector2};
 /// Distance between points that are kept, metres: near the lidar beams lie closer than that, and would count as more
 /// wall than there is.
 pub(super) const SPACING: f64 = 0.05;
+/// Distance from the base up to which hits are used, metres: farther beams are too far apart to be registered, and bound
+/// what a search may cost.
+const FARTHEST: f64 = 40.0;
+/// Number of points of a scan, at most: more than the walls of a round room of that radius have.
+const MAX_POINTS: usize = 10_000;
+/// Number of hits on each side of one that its normal is estimated from, at most.
+const MAX_NEIGHBOURS: usize = 64;
 /// Least radius in which a normal is estimated, metres; beams that lie farther apart widen it.
 const NORMAL_RADIUS: f64 = 0.15;
 /// The radius in distances between neighbouring beams.
@@ -25,13 +32,20 @@ pub struct ScanPoint {
 }
 
 /// Computes the points of a scan from its hits in the order of the beams, given in the frame of the base, which were
-/// seen from `lidar`. Hits closer than [`SPACING`] to the one before are used for the normals only.
+/// seen from `lidar`. Hits closer than [`SPACING`] to the one before are used for the normals only, and those farther than
+/// 40 m from the base not at all.
 pub fn scan_points(hits: &[Point2], lidar: &Point2) -> Vec<ScanPoint> {
     let mut kept: Option<Point2> = None;
     let mut points = Vec::with_capacity(hits.len().min(512));
     for (index, place) in hits.iter().enumerate() {
-        if kept.is_some_and(|last| (place - last).norm() < SPACING) {
+        let is_near = kept.is_some_and(|last| (place - last).norm() < SPACING);
+        // Written so that a value that is not a number fails it.
+        let is_within = place.coords.norm() <= FARTHEST;
+        if is_near || !is_within {
             continue;
+        }
+        if points.len() == MAX_POINTS {
+            break;
         }
         kept = Some(*place);
         points.push(ScanPoint { place: *place, normal: normal(hits, index, lidar) });
@@ -46,8 +60,8 @@ fn normal(hits: &[Point2], index: usize, lidar: &Point2) -> Option<Vector2<f64>>
     let nearest = beside(index.checked_sub(1).and_then(|before| hits.get(before))).min(beside(hits.get(index + 1)));
     let radius = (NORMAL_BEAMS * nearest).clamp(NORMAL_RADIUS, MAX_NORMAL_RADIUS);
     let is_near = |other: &&Point2| (*other - at).norm() <= radius;
-    let before = hits[..index].iter().rev().take_while(is_near);
-    let after = hits[index + 1..].iter().take_while(is_near);
+    let before = hits[..index].iter().rev().take(MAX_NEIGHBOURS).take_while(is_near);
+    let after = hits[index + 1..].iter().take(MAX_NEIGHBOURS).take_while(is_near);
     let (mut count, mut sum, mut squares) = (1.0, Vector2::zeros(), Matrix2::zeros());
     for other in before.chain(after) {
         let arm = other - at;
@@ -84,6 +98,16 @@ mod tests {
         assert!((38..=41).contains(&points.len()), "{}", points.len());
         let towards = |point: &ScanPoint| point.normal.is_some_and(|normal| (normal + Vector2::x()).norm() < 1e-6);
         assert!(points.iter().all(towards), "{points:?}");
+    }
+
+    #[test]
+    fn hits_far_away_are_left_out_and_a_scan_has_a_limited_number_of_points() {
+        let far = [Point2::new(1e7, 0.0), Point2::new(f64::NAN, 0.0), Point2::new(0.0, 41.0), Point2::new(0.0, 39.0)];
+        let points = scan_points(&far, &Point2::origin());
+        assert_eq!(points.iter().map(|point| point.place).collect::<Vec<_>>(), [far[3]]);
+        // Each hit is apart from the one before, and all are beside each other.
+        let many: Vec<Point2> = (0..200_000).map(|hit| Point2::new(0.06 * f64::from(hit % 2), 1.0)).collect();
+        assert_eq!(scan_points(&many, &Point2::origin()).len(), MAX_POINTS);
     }
 
     #[test]
