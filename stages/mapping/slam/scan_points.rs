@@ -32,7 +32,7 @@ pub struct ScanPoint {
 }
 
 /// Computes the points of a scan from its hits in the order of the beams, given in the frame of the base, which were
-/// seen from `lidar`. Hits closer than [`SPACING`] to the one before are used for the normals only, and those farther than
+/// seen from `lidar`. Hits closer than 5 cm to the one before are used for the normals only, and those farther than
 /// 40 m from the base not at all.
 pub fn scan_points(hits: &[Point2], lidar: &Point2) -> Vec<ScanPoint> {
     let mut kept: Option<Point2> = None;
