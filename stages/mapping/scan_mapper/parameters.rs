@@ -19,7 +19,7 @@ pub enum MappingMode {
 }
 
 /// Parameters of the scan mapper.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ScanMapperParameters {
     /// Resolution of the map, metres per cell.

@@ -152,7 +152,7 @@ impl Robot {
             for (time, scan) in self.waiting.drain(..) {
                 let at = odometry.pose(time, &scan, slam);
                 self.kept_odometry.push((time, at));
-                let is_due = slam.is_due(&at, parameters);
+                let is_due = slam.is_due(time, &at, parameters);
                 let is_matched = !is_due || slam.add(time, &at, &scan);
                 outcome(if is_matched { ScanOutcome::Used } else { ScanOutcome::NotMatched });
             }
@@ -199,16 +199,15 @@ impl Robot {
         }
     }
 
-    /// The map so far; `None` if nothing is known.
-    ///
-    /// # Errors
-    /// A scan is so far away that the map would get too large: it is left out.
-    pub(super) fn map(&mut self) -> Result<Option<SnapshotMap>, TooLarge> {
+    /// The map so far, `None` if nothing is known, and how many scans were left out of it just then, as it would get too
+    /// large.
+    pub(super) fn map(&mut self) -> (Option<SnapshotMap>, usize) {
         match &mut self.localization {
-            Localization::NotYet => Ok(None),
-            Localization::ByPoses(map) => Ok(map.snapshot()),
+            Localization::NotYet => (None, 0),
+            Localization::ByPoses(map) => (map.snapshot(), 0),
             Localization::ByOdometry(slam) | Localization::ByScans(slam, _) => {
-                slam.draw().map(|()| slam.map().snapshot())
+                let left_out = slam.draw();
+                (slam.map().snapshot(), left_out)
             }
         }
     }
@@ -245,7 +244,7 @@ fn add_to_slam(
     parameters: &ScanMapperParameters,
 ) -> ScanOutcome {
     let Some(start) = pose_at(odometry, time, parameters) else { return ScanOutcome::NoPose };
-    if !slam.is_due(&start, parameters) {
+    if !slam.is_due(time, &start, parameters) {
         return ScanOutcome::Used;
     }
     // The relative poses of the beams of one scan are those of odometry.

@@ -1,6 +1,6 @@
 //! The map of a robot that has odometry only, or nothing but scans: its poses are found by SLAM.
 
-use super::{BaseBeam, ScanBeams, ScanMap, ScanMapperParameters, TooLarge};
+use super::{BaseBeam, ScanBeams, ScanMap, ScanMapperParameters};
 use crate::mapping::slam::{ScanPoint, Trajectory, scan_points};
 use crate::shared::geometry::{Point2, Pose2, pose, wrap_angle};
 use gridweave_runtime::message::LogTime;
@@ -60,10 +60,13 @@ impl SlamMap {
     }
 
     /// Whether the robot has moved so far from the last scan, to the pose `odometry`, that another one is to be added.
-    pub(super) fn is_due(&self, odometry: &Pose2, parameters: &ScanMapperParameters) -> bool {
+    /// Scans that are not later than the last are not.
+    pub(super) fn is_due(&self, time: LogTime, odometry: &Pose2, parameters: &ScanMapperParameters) -> bool {
         self.scans.last().is_none_or(|last| {
             let moved = last.odometry.inv_mul(odometry);
-            moved.translation.vector.norm() >= parameters.step || moved.rotation.angle().abs() >= parameters.step_yaw
+            let is_far = moved.translation.vector.norm() >= parameters.step
+                || moved.rotation.angle().abs() >= parameters.step_yaw;
+            time > last.time && is_far
         })
     }
 
@@ -111,12 +114,9 @@ impl SlamMap {
         self.scans[0].odometry * self.trajectory.poses()[scan]
     }
 
-    /// Draws the scans that are not in the map.
-    ///
-    /// # Errors
-    /// The map would get too large; it stays as it was, without the scan.
-    pub(super) fn draw(&mut self) -> Result<(), TooLarge> {
-        let mut outcome = Ok(());
+    /// Draws the scans that are not in the map. Returns how many were left out, as the map would get too large.
+    pub(super) fn draw(&mut self) -> usize {
+        let mut left_out = 0;
         let mut beams = ScanBeams { transform_base_lidar: Pose2::identity(), beams: Vec::new(), duration: 0.0 };
         while let Some(scan) = self.scans.get(self.drawn) {
             beams.transform_base_lidar = scan.transform_base_lidar;
@@ -129,9 +129,9 @@ impl SlamMap {
             }));
             let at = self.pose(self.drawn);
             self.drawn += 1;
-            outcome = outcome.and(self.map.draw(&beams, |_| Some(at)));
+            left_out += usize::from(self.map.draw(&beams, |_| Some(at)).is_err());
         }
-        outcome
+        left_out
     }
 
     /// The map of the scans that were drawn.

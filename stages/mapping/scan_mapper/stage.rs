@@ -1,7 +1,7 @@
 //! The stage `scan_mapper`.
 
 use super::robot::{Robot, ScanOutcome};
-use super::{MappingMode, ScanBeams, ScanMapperParameters, TooLarge};
+use super::{MappingMode, ScanBeams, ScanMapperParameters};
 use crate::shared::geometry::Pose2;
 use crate::tags::tag_localizer::time_of;
 use gridweave_runtime::message::LogTime;
@@ -63,7 +63,7 @@ impl ScanMapper {
         output: &Output<Drawn>,
     ) -> Result<(), StageError> {
         let time = time_of(message.header.stamp, message.log_time());
-        let parameters = self.parameters.clone();
+        let parameters = self.parameters;
         let Some(robot) = self.robot(message.robot(), output) else { return Ok(()) };
         let frame = robot.frame.get_or_insert_with(|| message.header.frame_id.clone());
         if *frame != message.header.frame_id {
@@ -91,7 +91,7 @@ impl ScanMapper {
         output: &Output<Drawn>,
     ) -> Result<(), StageError> {
         let time = time_of(message.header.stamp, message.log_time());
-        let parameters = self.parameters.clone();
+        let parameters = self.parameters;
         let is_offline = parameters.mode == MappingMode::Offline;
         let Some(robot) = self.robot(message.robot(), output) else { return Ok(()) };
         let pose = message.pose.pose.planar();
@@ -110,7 +110,7 @@ impl ScanMapper {
     fn receive_scan(&mut self, message: Received<'_, RangeScan>, output: &Output<Drawn>) -> Result<(), StageError> {
         let time = time_of(message.header.stamp, message.log_time());
         let scan = ScanBeams::of(&message, &self.parameters);
-        let parameters = self.parameters.clone();
+        let parameters = self.parameters;
         let Some(robot) = self.robot(message.robot(), output) else { return Ok(()) };
         let Some(scan) = scan else {
             output.warn(format!("scans of {} with angles or times that are not finite are left out", message.robot()));
@@ -205,7 +205,7 @@ impl ScanMapper {
             }
             self.draw_and_send(&name, true, output)?;
             let is_empty =
-                |robot: &mut Robot| robot.drawn.is_some() && robot.lost().is_none() && robot.map() == Ok(None);
+                |robot: &mut Robot| robot.drawn.is_some() && robot.lost().is_none() && robot.map().0.is_none();
             if self.robots.get_mut(&name).is_some_and(is_empty) {
                 output.warn(format!(
                     "no map of {name} was drawn: its scans show nothing within {} m",
@@ -218,10 +218,8 @@ impl ScanMapper {
 }
 
 fn send_map(name: &str, robot: &mut Robot, drawn_until: LogTime, output: &Output<Drawn>) -> Result<(), StageError> {
-    let map = robot.map().unwrap_or_else(|TooLarge| {
-        output.warn(too_large(name));
-        None
-    });
+    let (map, left_out) = robot.map();
+    (0..left_out).for_each(|_| output.warn(too_large(name)));
     let Some(map) = map else { return Ok(()) };
     let prefix = map.geometry.prefix(Header::new(drawn_until, map_frame(name, robot)));
     output.map.send_grid(name, &prefix, |blank| blank.copy_cells(&map.cells))

@@ -267,6 +267,29 @@ fn offline_all_poses_and_the_map_come_at_the_end() {
 }
 
 #[test]
+fn a_scan_too_far_away_and_scans_that_come_late_do_not_cost_the_map() {
+    let mut bench = Bench::new("mode = 'offline'");
+    for tick in 0..120 {
+        let seconds = 0.1 * f64::from(tick);
+        // One jump of the wheels' counters, and back.
+        let jump = if tick == 110 { 1e6 } else { 0.0 };
+        let odometry = truth(seconds);
+        bench.pose("odometry", "robot1/odom", seconds, pose(jump, 0.0, 0.0) * odometry);
+        bench.scan(seconds, &scan(seconds));
+        if tick % 10 == 9 {
+            bench.scan(seconds, &scan(seconds - 0.8));
+        }
+    }
+    let (map, count) = bench.map(12.0);
+    assert_eq!(count, 1);
+    let drawn = measure(&map.unwrap(), &Pose2::identity());
+    assert!(drawn.mean < CELL && drawn.greatest < 4.0 * CELL, "{} {}", drawn.mean, drawn.greatest);
+    assert!(bench.0.warnings().keys().any(|warning| warning.contains("too large")), "{:?}", bench.0.warnings());
+    let poses: Vec<PoseWithCovarianceStamped> = bench.0.take("pose").unwrap();
+    assert!(poses.iter().all(|pose| pose.pose.pose.position.x.is_finite()));
+}
+
+#[test]
 fn scans_that_lie_on_no_others_give_a_warning_and_no_map() {
     let mut bench = Bench::new("mode = 'offline'");
     for tick in 0..80 {

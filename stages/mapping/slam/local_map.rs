@@ -40,7 +40,7 @@ pub struct Match {
     pub pose: Pose2,
     /// Inverse of the covariance of (x, y, yaw) in the map's frame by the matches alone.
     pub information: Matrix3<f64>,
-    /// Share of the points with a normal that lie on a surface of the same direction.
+    /// Share of the points that lie on the map: those with a normal on a surface of the same direction.
     pub matched: f64,
 }
 
@@ -54,15 +54,14 @@ impl LocalMap {
             for point in scan {
                 let place = pose * point.place;
                 points.push(place);
-                if point.normal.is_none() {
+                let Some(normal) = point.normal else {
                     spots.push(place);
-                }
-                if let Some(normal) = point.normal {
-                    let normal = pose * normal;
-                    let sector = (normal.y.atan2(normal.x) / TAU * SECTORS).floor() as i32;
-                    let cell = (place / SURFACE_CELL).map(f64::floor);
-                    keyed.push(([cell.x as i32, cell.y as i32, sector], Surface { place, normal }));
-                }
+                    continue;
+                };
+                let normal = pose * normal;
+                let sector = (normal.y.atan2(normal.x) / TAU * SECTORS).floor() as i32;
+                let cell = (place / SURFACE_CELL).map(f64::floor);
+                keyed.push(([cell.x as i32, cell.y as i32, sector], Surface { place, normal }));
             }
         }
         // A stable sort: the order of the sums is that of the scans.
@@ -84,11 +83,6 @@ impl LocalMap {
     /// The likelihood field of the map within a rectangle.
     pub(super) fn field(&self, low: &Point2, high: &Point2) -> LikelihoodField {
         LikelihoodField::new(self.points.iter().copied(), low, high)
-    }
-
-    /// Whether there is nothing.
-    pub fn is_empty(&self) -> bool {
-        self.points.is_empty()
     }
 
     /// Registers points on the walls: the distances of the points to the lines of the surfaces are minimised together
@@ -120,12 +114,11 @@ impl LocalMap {
     /// Normal equations of a small move (x, y, yaw about the points' frame), and the share of matched points.
     fn equations(&self, scan: &[ScanPoint], pose: &Pose2, radius: f64) -> (Matrix3<f64>, Vector3<f64>, f64) {
         let (mut matrix, mut vector) = (Matrix3::zeros(), Vector3::zeros());
-        let (mut with_normal, mut matched) = (0u32, 0u32);
+        let mut matched = 0;
         // Neighbouring points of a wall are one measurement.
         let information = SPACING / CORRELATION_LENGTH / (DEVIATION * DEVIATION);
         let width = WEIGHT_WIDTH * radius;
         for point in scan {
-            with_normal += 1;
             let arm = pose.rotation * point.place.coords;
             let place = pose.translation.vector + arm;
             let Some(normal) = point.normal else {
@@ -153,7 +146,7 @@ impl LocalMap {
             matrix += weight * row * row.transpose();
             vector += weight * off * row;
         }
-        (matrix, vector, f64::from(matched) / f64::from(with_normal.max(1)))
+        (matrix, vector, f64::from(matched) / scan.len().max(1) as f64)
     }
 }
 

@@ -5,7 +5,6 @@ use super::local_map::LocalMap;
 use super::pose_graph::{Constraint, PoseGraph, turned_information};
 use super::scan_points::ScanPoint;
 use super::scan_registration::{GAIN, reach, thinned};
-use super::trajectory::Keyframe;
 use nalgebra::Matrix3;
 use std::ops::Range;
 
@@ -31,29 +30,20 @@ const OTHER_PLACE: [f64; 2] = [0.5, 0.15];
 /// Share of the information of a registration that a closure has: the submaps are bent themselves.
 const INFORMATION_SHARE: f64 = 0.3;
 
-/// Two submaps that have been found to be at the same place.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LoopClosure {
-    /// The pose of the later submap's middle scan in that of the earlier one.
-    pub constraint: Constraint,
-    /// Share of the later submap's points that lie on walls of the earlier one.
-    pub matched: f64,
-    /// Mean likelihood of the points at the pose, 0 to 1.
-    pub response: f64,
-}
-
 /// A submap that has just been finished, which may be where the robot was before.
 pub(super) struct Revisit<'a> {
     pub(super) graph: &'a PoseGraph,
-    pub(super) keyframes: &'a [Keyframe],
+    /// The points of each scan.
+    pub(super) scans: &'a [Vec<ScanPoint>],
     /// The submaps, as ranges of scans; the last is the one that is looked for.
     pub(super) submaps: &'a [Range<usize>],
     /// First scan of the local map: what is in it is registered already.
     pub(super) recent: usize,
 }
 
-/// Looks for the last submap in all earlier ones that may be at its place.
-pub(super) fn find_loop_closures(revisit: &Revisit<'_>) -> Vec<LoopClosure> {
+/// Looks for the last submap in the earlier ones that may be at its place. Each that fits is the pose of its middle scan
+/// in that of the earlier submap.
+pub(super) fn find_loop_closures(revisit: &Revisit<'_>) -> Vec<Constraint> {
     let Some((own, earlier)) = revisit.submaps.split_last() else { return Vec::new() };
     let centre = middle(own);
     let poses = &revisit.graph.poses;
@@ -93,7 +83,7 @@ impl Revisit<'_> {
                 place: by * point.place,
                 normal: point.normal.map(|normal| by * normal),
             };
-            self.keyframes[scan].points.iter().map(moved)
+            self.scans[scan].iter().map(moved)
         };
         scans.clone().flat_map(of_scan).collect()
     }
@@ -106,7 +96,7 @@ impl Revisit<'_> {
         centre: usize,
         points: &[ScanPoint],
         covariance: &Matrix3<f64>,
-    ) -> Option<LoopClosure> {
+    ) -> Option<Constraint> {
         let poses = &self.graph.poses;
         let at = middle(&self.submaps[other]);
         let deviations = [(covariance.m11 + covariance.m22).sqrt(), covariance.m33.sqrt()];
@@ -115,7 +105,7 @@ impl Revisit<'_> {
         let after = self.submaps.get(other + 1).filter(|after| after.end <= self.recent);
         let last = after.map_or(self.submaps[other].end, |after| after.end);
         let into = poses[at].inverse();
-        let map = LocalMap::new((first..last).map(|scan| (into * poses[scan], &self.keyframes[scan].points[..])));
+        let map = LocalMap::new((first..last).map(|scan| (into * poses[scan], &self.scans[scan][..])));
         let mean = into * poses[centre];
         let half = |axis: usize| (WINDOW * deviations[axis]).clamp(LEAST_WINDOW[axis], LARGEST_WINDOW[axis]);
         let window = [half(0), half(0), half(1)];
@@ -134,13 +124,12 @@ impl Revisit<'_> {
         if search(&field, &searched, &prior, GAIN, least, Some(&excluded)).is_some() {
             return None;
         }
-        let constraint = Constraint {
+        Some(Constraint {
             from: at,
             to: centre,
             transform: fit.pose,
             information: INFORMATION_SHARE * fit.information,
             is_loop: true,
-        };
-        Some(LoopClosure { constraint, matched: fit.matched, response: found.response })
+        })
     }
 }

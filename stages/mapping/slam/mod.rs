@@ -24,8 +24,7 @@ mod tests;
 mod trajectory;
 
 pub use local_map::LocalMap;
-pub use loop_closure::LoopClosure;
 pub use odometry_noise::OdometryNoise;
 pub use pose_graph::{Constraint, PoseGraph};
 pub use scan_points::{ScanPoint, scan_points};
-pub use trajectory::{Keyframe, Trajectory};
+pub use trajectory::Trajectory;

@@ -22,6 +22,8 @@ const WELL_MATCHED: f64 = 0.6;
 const SLIP_WINDOW: [f64; 2] = [0.5, 0.7];
 /// How much more of the points must match for a pose in the wider window.
 const SLIP_GAIN: f64 = 0.2;
+/// Margin of the likelihood field, metres: the reach of a wall in it.
+const MARGIN: f64 = 0.3;
 
 /// A scan on a map.
 #[derive(Clone, Copy, Debug)]
@@ -88,6 +90,3 @@ pub(super) fn reach(points: &[Point2], pose: &Pose2, window: &[f64; 3]) -> [Poin
     let margin = Vector2::new(window[0], window[1]) + Vector2::repeat(MARGIN);
     [(corners[0] - margin).into(), (corners[1] + margin).into()]
 }
-
-/// Margin of the likelihood field, metres: the reach of a wall in it.
-const MARGIN: f64 = 0.3;

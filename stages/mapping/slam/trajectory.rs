@@ -1,7 +1,7 @@
 //! The poses of a robot at its scans, as they are known so far.
 
 use super::local_map::LocalMap;
-use super::loop_closure::{LoopClosure, Revisit, find_loop_closures};
+use super::loop_closure::{Revisit, find_loop_closures};
 use super::odometry_noise::OdometryNoise;
 use super::pose_graph::{Constraint, PoseGraph, turned_information};
 use super::scan_points::ScanPoint;
@@ -25,21 +25,13 @@ const REVISITED_DISTANCE: f64 = 10.0;
 const REVISITED_SUBMAPS: usize = 6;
 const REVISITED_DEVIATIONS: [f64; 2] = [0.15, 0.05];
 
-/// A scan that is a node of the pose graph.
-#[derive(Clone, Debug)]
-pub struct Keyframe {
-    /// Its points, in the frame of the base.
-    pub points: Vec<ScanPoint>,
-    /// Share of the points that lay on the local map when it was registered.
-    pub matched: f64,
-}
-
 /// The scans of a robot with their poses, in the frame of the first.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
     noise: OdometryNoise,
     graph: PoseGraph,
-    keyframes: Vec<Keyframe>,
+    /// The points of each scan, in the frame of the base.
+    scans: Vec<Vec<ScanPoint>>,
     /// Path of odometry up to each scan, metres.
     paths: Vec<f64>,
     submaps: Vec<Range<usize>>,
@@ -47,7 +39,6 @@ pub struct Trajectory {
     submap_start: usize,
     /// Earlier submaps that are part of the local map.
     revisited: Vec<usize>,
-    closures: Vec<LoopClosure>,
     unmatched: usize,
 }
 
@@ -58,12 +49,11 @@ impl Trajectory {
         Self {
             noise: OdometryNoise::new(odometry_deviation),
             graph: PoseGraph::default(),
-            keyframes: Vec::new(),
+            scans: Vec::new(),
             paths: Vec::new(),
             submaps: Vec::new(),
             submap_start: 0,
             revisited: Vec::new(),
-            closures: Vec::new(),
             unmatched: 0,
         }
     }
@@ -73,14 +63,9 @@ impl Trajectory {
         &self.graph.poses
     }
 
-    /// The scans.
-    pub fn keyframes(&self) -> &[Keyframe] {
-        &self.keyframes
-    }
-
-    /// The loop closures that were found.
-    pub fn closures(&self) -> &[LoopClosure] {
-        &self.closures
+    /// The loop closures that were found: poses of later scans in earlier ones.
+    pub fn closures(&self) -> impl Iterator<Item = &Constraint> {
+        self.graph.constraints.iter().filter(|constraint| constraint.is_loop)
     }
 
     /// How many scans lay on no earlier ones, and have their pose by odometry.
@@ -92,7 +77,7 @@ impl Trajectory {
     /// closure has moved earlier scans.
     pub fn add(&mut self, moved: &Pose2, points: Vec<ScanPoint>) -> bool {
         let Some(last) = self.graph.poses.last().copied() else {
-            self.push(Pose2::identity(), 0.0, Keyframe { points, matched: 1.0 });
+            self.push(Pose2::identity(), 0.0, points);
             return false;
         };
         let guess = last * moved;
@@ -112,7 +97,7 @@ impl Trajectory {
             self.noise.learn(moved, &transform, &covariance);
         }
         self.graph.constraints.push(Constraint { from: to - 1, to, transform, information, is_loop: false });
-        self.push(pose, moved.translation.vector.norm(), Keyframe { points, matched: found.matched });
+        self.push(pose, moved.translation.vector.norm(), points);
         let is_long = self.paths[to] - self.paths[self.submap_start] > SUBMAP_PATH;
         (is_long || to - self.submap_start >= SUBMAP_SCANS) && self.finish_submap()
     }
@@ -128,15 +113,15 @@ impl Trajectory {
         (found.matched >= LEAST_MATCHED).then(|| last.inv_mul(&found.pose))
     }
 
-    fn push(&mut self, pose: Pose2, way: f64, keyframe: Keyframe) {
+    fn push(&mut self, pose: Pose2, way: f64, points: Vec<ScanPoint>) {
         self.graph.poses.push(pose);
         self.paths.push(self.paths.last().map_or(0.0, |path| path + way));
-        self.keyframes.push(keyframe);
+        self.scans.push(points);
     }
 
     /// The first of the scans that make up the local map.
     fn recent(&self) -> usize {
-        let count = self.keyframes.len();
+        let count = self.scans.len();
         let path = self.paths.last().map_or(0.0, |path| path - RECENT_PATH);
         self.paths.partition_point(|at| *at < path).max(count.saturating_sub(RECENT_SCANS))
     }
@@ -145,25 +130,24 @@ impl Trajectory {
     fn local_map(&self) -> LocalMap {
         let recent = self.recent();
         let revisited = self.revisited.iter().flat_map(|submap| self.submaps[*submap].clone());
-        let scans = revisited.filter(|scan| *scan < recent).chain(recent..self.keyframes.len());
-        LocalMap::new(scans.map(|scan| (self.graph.poses[scan], &self.keyframes[scan].points[..])))
+        let scans = revisited.filter(|scan| *scan < recent).chain(recent..self.scans.len());
+        LocalMap::new(scans.map(|scan| (self.graph.poses[scan], &self.scans[scan][..])))
     }
 
     /// Finishes the submap of the last scans, and looks for loop closures. Returns whether one has moved earlier
     /// scans.
     pub fn finish_submap(&mut self) -> bool {
-        let own = self.submap_start..self.keyframes.len();
+        let own = self.submap_start..self.scans.len();
         if own.is_empty() {
             return false;
         }
         self.submap_start = own.end;
         self.submaps.push(own);
         let recent = self.recent();
-        let revisit = Revisit { graph: &self.graph, keyframes: &self.keyframes, submaps: &self.submaps, recent };
+        let revisit = Revisit { graph: &self.graph, scans: &self.scans, submaps: &self.submaps, recent };
         let found = find_loop_closures(&revisit);
-        self.graph.constraints.extend(found.iter().map(|closure| closure.constraint));
         let has_moved = !found.is_empty();
-        self.closures.extend(found);
+        self.graph.constraints.extend(found);
         if has_moved {
             self.graph.optimize();
         }
@@ -173,7 +157,7 @@ impl Trajectory {
 
     /// The earlier submaps around the last scan, whose pose relative to it is well known.
     fn tied_submaps(&self, recent: usize) -> Vec<usize> {
-        let Some(last) = self.graph.poses.len().checked_sub(1).filter(|_| !self.closures.is_empty()) else {
+        let Some(last) = self.graph.poses.len().checked_sub(1).filter(|_| self.closures().next().is_some()) else {
             return Vec::new();
         };
         let covariances = self.graph.covariances_from(last);
