@@ -37,10 +37,10 @@ struct Seen {
     participants_with_names: BTreeSet<Prefix>,
     /// Endpoints whose node is not known yet.
     nameless: BTreeMap<Guid, (Instant, EndpointData)>,
-    /// What was told of.
+    /// Entities of which watchers were notified.
     entities: BTreeMap<Guid, Entity>,
     mismatches: Vec<(Instant, Mismatch)>,
-    told_mismatches: BTreeSet<String>,
+    reported_mismatches: BTreeSet<String>,
 }
 
 fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -79,7 +79,7 @@ impl Graph {
     fn settle(&self) {
         let now = Instant::now();
         let mut seen = lock(&self.seen);
-        let Seen { names, nameless, entities, mismatches, told_mismatches, .. } = &mut *seen;
+        let Seen { names, nameless, entities, mismatches, reported_mismatches, .. } = &mut *seen;
         let is_ready = |since: Instant, guid: &Guid| names.contains_key(guid) || now.duration_since(since) >= PATIENCE;
         let mut new = Vec::new();
         nameless.retain(|guid, (since, endpoint)| {
@@ -99,16 +99,16 @@ impl Graph {
             }
             !is_ready
         });
-        problems.retain(|text| told_mismatches.insert(text.clone()));
+        problems.retain(|text| reported_mismatches.insert(text.clone()));
         drop(seen);
-        new.into_iter().for_each(|entity| self.tell(&entity, true));
+        new.into_iter().for_each(|entity| self.notify(&entity, true));
         for text in problems {
             tracing::warn!("{text}");
             lock(&self.problems).push(text);
         }
     }
 
-    fn tell(&self, entity: &Entity, is_there: bool) {
+    fn notify(&self, entity: &Entity, is_there: bool) {
         lock(&self.watchers).iter().for_each(|watcher| watcher(entity.clone(), is_there));
     }
 }
@@ -137,7 +137,7 @@ impl Watch for Arc<Graph> {
         let gone = seen.entities.remove(&guid);
         drop(seen);
         if let Some(entity) = gone {
-            self.tell(&entity, false);
+            self.notify(&entity, false);
         }
     }
 
@@ -223,25 +223,25 @@ mod tests {
     }
 
     #[test]
-    fn an_endpoint_is_told_once_its_node_is_known_and_at_once_if_it_has_none() {
+    fn an_endpoint_is_reported_once_its_node_is_known_and_at_once_if_it_has_none() {
         let graph = Graph::new(0);
-        let (sender, told) = channel();
+        let (sender, reported) = channel();
         graph.watch(Box::new(move |entity, is_there| sender.send((entity, is_there)).unwrap()));
         graph.endpoint(&endpoint(1, "rt/robot1/map"), true);
-        let (entity, _) = told.try_recv().unwrap();
+        let (entity, _) = reported.try_recv().unwrap();
         assert_eq!((entity.full_node_name().as_str(), entity.session.len()), ("/", 24));
         graph.endpoint(&endpoint(2, NAMES_TOPIC), true);
         graph.endpoint(&endpoint(3, "rt/robot2/map"), true);
-        assert!(told.try_recv().is_err(), "its name is waited for");
+        assert!(reported.try_recv().is_err(), "its name is waited for");
         let name = NodeName { namespace: "/robot2".into(), name: "slam_toolbox".into() };
         let message = super::super::dds_names::message(Guid::default(), &name, &[endpoint(3, "").guid]);
         graph.note_names(&message);
-        let (entity, is_there) = told.try_recv().unwrap();
+        let (entity, is_there) = reported.try_recv().unwrap();
         assert_eq!((entity.full_node_name().as_str(), is_there), ("/robot2/slam_toolbox", true));
         graph.endpoint(&endpoint(3, "rt/robot2/map"), false);
-        assert_eq!(told.try_recv().unwrap(), (entity, false));
+        assert_eq!(reported.try_recv().unwrap(), (entity, false));
         graph.endpoint(&endpoint(4, "rr/robot2/set_parametersReply"), true);
-        assert!(told.try_recv().is_err(), "a service is no topic");
+        assert!(reported.try_recv().is_err(), "a service is no topic");
     }
 
     #[test]

@@ -20,7 +20,7 @@ pub(crate) struct DdsNode {
     participant: Participant,
 }
 
-/// What others are told of the node.
+/// The node as others see it.
 struct OwnNode {
     participant: Guid,
     name: NodeName,

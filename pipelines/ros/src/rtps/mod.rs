@@ -1,7 +1,7 @@
 //! The wire protocol of DDS, the default middleware of ROS 2: DDSI-RTPS 2.3, as far as it takes to publish and subscribe among
 //! Fast DDS and Cyclone DDS. What messages say is not looked into.
 //!
-//! - Participants find each other by multicast, or on known machines one by one ([`network`]), and tell what they are
+//! - Participants find each other by multicast, or on known machines one by one ([`network`]), and announce what they are
 //!   ([`discovered`]). Who is not heard of for the time of its lease is gone, and so is who says so ([`disposal`]).
 //! - Endpoints are announced by writers of their own. A writer and a reader of one topic and one type match if the writer offers
 //!   what the reader requests ([`policies`]).

@@ -1,4 +1,4 @@
-//! A participant: it finds others and is found by them, and what happens is told to those who watch.
+//! A participant: it finds others and is found by them, and notifies watchers of what happens.
 
 use super::discovered::{EndpointData, ParticipantData};
 use super::disposal;
@@ -16,26 +16,26 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// Others are told so often that it is there, and so much faster at first.
+/// Periods of the announcements of a participant: afterwards, and for the first ones; and the number of those.
 const ANNOUNCEMENT: Duration = Duration::from_secs(3);
 const FIRST_ANNOUNCEMENT: Duration = Duration::from_millis(100);
 const FIRST_ANNOUNCEMENTS: u32 = 10;
-/// So long after it was last heard of others take it to be gone.
+/// Time after its last announcement after which others take it to be gone.
 const LEASE: Duration = Duration::from_secs(20);
 /// The largest datagram, bytes.
 const LARGEST_DATAGRAM: usize = 65536;
-/// So many fragments are sent at a time, and then the reader is given time to take them: the buffers of its system may hold no more.
+/// Number of fragments that are sent at a time, and the pause after these: the buffers of a reader's system may hold no more.
 const BURST: usize = 8;
 const PAUSE: Duration = Duration::from_micros(200);
-/// So long, at the end, readers are given to take what they lack.
+/// Longest time at the end for readers to acknowledge what they lack.
 const LINGER: Duration = Duration::from_secs(2);
-/// So long it waits at most before it looks what is due.
+/// Longest wait before it checks what is due.
 const LONGEST_WAIT: Duration = Duration::from_secs(1);
 
 /// Called with each sample of a reader.
 type OnSample = Arc<dyn Fn(Sample) + Send + Sync>;
 
-/// Is told of the endpoints of others.
+/// A watcher, which is notified of the endpoints of others.
 pub(crate) trait Watch: Send + Sync {
     /// An endpoint is there, or is no more.
     fn endpoint(&self, endpoint: &EndpointData, is_there: bool);
@@ -118,9 +118,9 @@ impl Participant {
         self.shared.own.prefix
     }
 
-    /// Tells of all endpoints of others, those that are there and those that come.
+    /// Notifies a watcher of all endpoints of others, those that are there and those that come.
     pub(crate) fn watch(&self, watcher: Box<dyn Watch>) {
-        // In this order, as where events are told.
+        // Locks in the order of `notify`.
         let mut watchers = lock(&self.shared.watchers);
         let present: Vec<EndpointData> = lock(&self.shared.state).endpoints().cloned().collect();
         present.iter().for_each(|endpoint| watcher.endpoint(endpoint, true));
@@ -214,7 +214,7 @@ impl Shared {
         let outgoing = std::mem::take(&mut state.outgoing);
         drop(state);
         self.send(outgoing);
-        // What is due may be so sooner, and mismatches are to be told.
+        // Something may be due sooner, and mismatches are to be reported.
         self.network.wake();
         changed
     }
@@ -244,7 +244,7 @@ impl Shared {
             let (outgoing, events) = (std::mem::take(&mut state.outgoing), std::mem::take(&mut state.events));
             drop(state);
             self.send(outgoing);
-            self.tell(events);
+            self.notify(events);
             lock(&self.watchers).iter().for_each(|watcher| watcher.tick());
             self.network.receive(until, &mut buffer, |datagram, from| self.take(datagram, from));
         }
@@ -264,7 +264,7 @@ impl Shared {
             greeted.into_iter().for_each(|to| self.network.send(&greeting, to));
         }
         self.send(outgoing);
-        self.tell(events);
+        self.notify(events);
     }
 
     /// The message that it is there.
@@ -317,7 +317,7 @@ impl Shared {
         }
     }
 
-    fn tell(&self, events: Vec<Event>) {
+    fn notify(&self, events: Vec<Event>) {
         for event in events {
             match event {
                 Event::Sample(reader, sample) => {

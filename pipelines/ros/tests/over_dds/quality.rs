@@ -1,4 +1,4 @@
-//! What does not fit is told, once, and the rest goes on.
+//! What does not fit is reported once, and the rest goes on.
 
 use crate::command::{GRIDWEAVE, Running, run};
 use crate::domain::{Domain, give, map, sent, warned};
