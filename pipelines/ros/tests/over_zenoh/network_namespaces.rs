@@ -74,7 +74,13 @@ fn assert_same_merged_map(folder: &Path) {
         fs::read(folder.join(format!("{log}.pgm"))).unwrap()
     };
     let (by_bridge, by_wire) = (merge("base"), merge("robots"));
-    assert!(by_wire.len() > 10_000 && by_bridge == by_wire, "{} and {} bytes", by_bridge.len(), by_wire.len());
+    let output = fs::read_to_string(folder.join("base.txt")).unwrap();
+    assert!(
+        by_wire.len() > 10_000 && by_bridge == by_wire,
+        "{} and {} bytes: {output}",
+        by_bridge.len(),
+        by_wire.len()
+    );
 }
 
 #[test]
