@@ -120,6 +120,11 @@ definitions![
     "visualization_msgs/UVCoordinate",
 ];
 
+/// The definitions alone, without those of the types that they use, by the name of the type: `package/msg/Type`.
+pub fn message_texts() -> impl Iterator<Item = (String, &'static str)> {
+    DEFINITIONS.iter().map(|(name, text)| (name.replacen('/', "/msg/", 1), *text))
+}
+
 /// The schema of a ROS 2 type as stored in a log (encoding `ros2msg`): the definition of the type, followed by that of
 /// each type that it uses, each once, after a line of 80 `=` and a line `MSG: package/Type`.
 ///
@@ -142,7 +147,7 @@ pub fn full_type_name(name: &str) -> Cow<'_, str> {
 
 /// The full names (`package/msg/Type`) of all types of [`schema_text`], sorted by name.
 pub fn schema_names() -> impl Iterator<Item = String> {
-    DEFINITIONS.iter().map(|(name, _)| name.replacen('/', "/msg/", 1))
+    message_texts().map(|(name, _)| name)
 }
 
 fn definition(name: &str) -> Option<&'static str> {

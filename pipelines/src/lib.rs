@@ -20,7 +20,7 @@ mod job;
 mod logging;
 mod merge_log;
 mod merge_text;
-
+pub mod merging;
 pub mod shipped;
 mod status;
 pub mod summary;
@@ -36,6 +36,7 @@ use clap::{CommandFactory, FromArgMatches};
 use gridweave_runtime::pipeline::PipelineErrors;
 use gridweave_runtime::stage::{Registry, StageKind};
 use status::{BadUse, Status};
+use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
@@ -52,29 +53,45 @@ pub fn command_with(
     verbs: &[Verb],
     on_warning: fn(&str, &str),
 ) -> ExitCode {
+    ExitCode::from(command_line(std::env::args_os(), kinds, verbs, on_warning))
+}
+
+/// Runs the command line with the given arguments, the name of the program first, as [`command_with`] does. Returns the exit status.
+pub fn command_line(
+    arguments: impl IntoIterator<Item = OsString>,
+    kinds: impl IntoIterator<Item = StageKind>,
+    verbs: &[Verb],
+    on_warning: fn(&str, &str),
+) -> u8 {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
     let registry = shipped::registry(kinds);
-    if std::env::args().any(|argument| argument == "--ros-args") {
+    if arguments.iter().any(|argument| argument == "--ros-args") {
         terminal::eprint_line(
             "error: `--ros-args` is for ROS programs. Here parameters are `--set STAGE.PARAMETER=VALUE`, topics of robots are named in \
              `[robots]` of the pipeline, those that are published by `--set STAGE.rename='[\"/map=/fleet/map\"]'`, and the node by \
              `--set STAGE.node=NAME`",
         );
-        return ExitCode::from(2);
+        return 2;
     }
     let command = verbs.iter().fold(cli::Cli::command(), |command, verb| command.subcommand(verb.command()));
-    match execute(&command.get_matches(), &registry, verbs, on_warning) {
-        Ok(Status::Done) => ExitCode::SUCCESS,
-        Ok(Status::BadUse) => ExitCode::from(2),
-        Ok(Status::Failed) => ExitCode::from(1),
-        Ok(Status::NotAllMerged) => ExitCode::from(3),
+    match execute(&command.get_matches_from(arguments), &registry, verbs, on_warning) {
+        Ok(Status::Done) => 0,
+        Ok(Status::BadUse) => 2,
+        Ok(Status::Failed) => 1,
+        Ok(Status::NotAllMerged) => 3,
         Err(error) => {
             match error.downcast_ref::<PipelineErrors>() {
                 Some(errors) => terminal::eprint_styled_line(errors.render(std::io::stderr().is_terminal())),
                 None => terminal::eprint_line(format_args!("error: {error:#}")),
             }
-            ExitCode::from(if error.is::<BadUse>() || error.is::<PipelineErrors>() { 2 } else { 1 })
+            if is_bad_use(&error) { 2 } else { 1 }
         }
     }
+}
+
+/// Whether the user has asked for something that cannot be, such as a parameter that does not exist.
+pub fn is_bad_use(error: &anyhow::Error) -> bool {
+    error.is::<BadUse>() || error.is::<PipelineErrors>()
 }
 
 fn execute(

@@ -41,12 +41,11 @@ static FORMAT: OnceLock<LogFormat> = OnceLock::new();
 /// # Errors
 /// The program cannot find itself.
 pub(crate) fn launch() -> Result<Launch> {
-    let mut launch = Launch::this_program().context("cannot find the program itself")?;
-    if FORMAT.get() == Some(&LogFormat::Json) {
-        let format = ["--log-format", "json"].map(str::to_owned);
-        launch.arguments = format.into_iter().chain(launch.arguments).collect();
-    }
-    Ok(launch)
+    let launch = Launch::this_program().context("cannot find the program itself")?.with("stage");
+    Ok(match FORMAT.get() {
+        Some(LogFormat::Json) => launch.with("--log-format").with("json"),
+        _ => launch,
+    })
 }
 
 /// Format of events.

@@ -151,7 +151,7 @@ fn pipeline(settings: &str, load: &str) -> Report {
         "[pipeline]\n{settings}\n[stages.a]\nkind = \"writer\"\n{load}\n[stages.b]\nkind = \"reader\"\ninputs = [\"a.{port}\"]\n"
     );
     let pipeline = Pipeline::parse("bench", &text, &registry(), &Overrides::default()).unwrap();
-    let report = run(&pipeline, &Launch::this_program().unwrap(), &()).unwrap();
+    let report = run(&pipeline, &Launch::this_program().unwrap().with("stage"), &()).unwrap();
     report.stages[1].counts.clone()
 }
 

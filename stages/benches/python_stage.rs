@@ -2,7 +2,7 @@
 //!
 //!     cargo bench -p gridweave-stages --bench python_stage
 //!
-//! `python3` in PATH, or what `GRIDWEAVE_PYTHON` names, must have the package of `stages/python`.
+//! `python3` in PATH, or what `GRIDWEAVE_PYTHON` names, must have the package of `pipelines/python`.
 //!
 //! - Through a pipeline of a source, the stage and a sink, on the engine `threads`: how long a message takes from the source to
 //!   the sink where the next is sent only then, and how many a second go through where the source sends as fast as it can.

@@ -24,7 +24,7 @@ pub(super) fn describe(python: &OsStr, module: &str) -> Result<String, Parameter
     let is_missing = |name: &str| errors.contains(&format!("No module named {name}"));
     if is_missing("gridweave") || is_missing("'gridweave'") {
         let help = format!(
-            "needs the package `gridweave`, which `{shown}` does not have: install it there by `pip install stages/python`, or \
+            "needs the package `gridweave`, which `{shown}` does not have: install it there by `pip install pipelines/python`, or \
              name in {INTERPRETER} the interpreter that has it"
         );
         return Err(ParameterError::new("module", help));

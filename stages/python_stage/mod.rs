@@ -1,7 +1,7 @@
 //! `python`: a stage that is written in Python.
 //!
-//! The package `gridweave` in [`stages/python`](../python/README.md) is the other side: asked by `python -m gridweave.describe
-//! MODULE`, it prints the ports and parameters of the stage, and `python -m gridweave.run MODULE FOLDER` is its program. The
+//! The package `gridweave` in [`pipelines/python`](../python/README.md) is the other side: asked by `python -m gridweave.describe
+//! MODULE`, it prints the ports and parameters of the stage, and `python -m gridweave.program MODULE FOLDER` is its program. The
 //! protocol between the two is that of every [`program`].
 
 mod describe;
@@ -70,7 +70,7 @@ fn ask(given: &toml::Table, folder: &Path) -> Result<ResolvedStage, ParameterErr
                 |given_interface| Ok(given_interface.to_owned()),
             )?;
             let interface = read(&json)?;
-            let arguments = ["-m", "gridweave.run", &module].map(Into::into).to_vec();
+            let arguments = ["-m", "gridweave.program", &module].map(Into::into).to_vec();
             let launch = Launch { program: PathBuf::from(python), arguments };
             let kind = program::kind_of("python", shown, interface, launch);
             asked.insert(key, (kind, json.clone()));

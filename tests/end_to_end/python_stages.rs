@@ -6,6 +6,7 @@ mod sources;
 use crate::support::{Ended, LogBuilder, SMALL_BUILDING, TestMap, gridweave_with, outcome, read, simulate};
 use std::ffi::OsStr;
 use std::fs;
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use tempfile::TempDir;
@@ -61,25 +62,29 @@ fn call(program: &Path, args: &[&OsStr]) {
 }
 
 impl Python {
-    /// With the package installed as a user does, and these packages besides.
+    /// With the package as a wheel installs it, but built as the tests are, and these packages besides.
     fn new(more: &[&str]) -> Self {
         let folder = TempDir::new().unwrap();
         let environment = folder.path().join("python");
         call(Path::new("python3"), &["-m".as_ref(), "venv".as_ref(), environment.as_ref()]);
-        // What is built leaves nothing in the repository.
-        let source = folder.path().join("repository");
-        fs::create_dir_all(source.join("logs")).unwrap();
-        for part in ["stages/python", "logs/msg"] {
-            copy(&repository().join(part), &source.join(part));
-        }
-        let package = source.join("stages/python");
-        let install = ["-m", "pip", "install", "--quiet"].map(OsStr::new);
-        let packages = more.iter().map(OsStr::new).chain([package.as_ref()]);
-        call(&environment.join("bin/python"), &install.into_iter().chain(packages).collect::<Vec<_>>());
+        let python = environment.join("bin/python");
+        let package = repository().join("pipelines/python");
+        let project: toml::Table = fs::read_to_string(package.join("pyproject.toml")).unwrap().parse().unwrap();
+        let needed =
+            project["project"]["dependencies"].as_array().unwrap().iter().map(|needed| needed.as_str().unwrap());
+        let install = ["-m", "pip", "install", "--quiet"].into_iter().chain(needed).chain(more.iter().copied());
+        call(&python, &install.map(OsStr::new).collect::<Vec<_>>());
+        let asked = Command::new(&python)
+            .args(["-c", "import sysconfig; print(sysconfig.get_path('platlib'), end='')"])
+            .output();
+        let installed = Path::new(OsStr::from_bytes(&asked.unwrap().stdout)).join("gridweave");
+        copy(&package.join("gridweave"), &installed);
+        let native = std::env::current_exe().unwrap().with_file_name("lib_native.so");
+        fs::copy(native, installed.join("_native.abi3.so")).unwrap();
         fs::write(folder.path().join("python.toml"), PIPELINE).unwrap();
         let modules = [
-            "stages/python/examples/circle.py",
-            "stages/python/examples/invert.py",
+            "pipelines/python/examples/circle.py",
+            "pipelines/python/examples/invert.py",
             "tests/end_to_end/python_stages/rooms.py",
             "tests/end_to_end/python_stages/troubled.py",
             "tests/end_to_end/python_stages/troubled_source.py",
@@ -129,7 +134,7 @@ impl Python {
     }
 
     fn unit_tests_pass(&self) {
-        let tests = repository().join("stages/python/tests");
+        let tests = repository().join("pipelines/python/tests");
         let args = ["-B", "-m", "unittest", "discover"].map(OsStr::new);
         call(&self.file("python/bin/python"), &args.into_iter().chain([tests.as_ref()]).collect::<Vec<_>>());
     }
@@ -223,7 +228,7 @@ impl Python {
         self.gridweave(&["kinds", "invert.py"]).assert(0, &help);
         let without = [("PATH", "/usr/bin:/bin")];
         let ended = gridweave_with(self.folder.path(), &["check", "python.toml"], &without);
-        ended.assert(2, &["needs the package `gridweave`", "pip install stages/python"]);
+        ended.assert(2, &["needs the package `gridweave`", "pip install pipelines/python"]);
         let interpreter = self.file("python/bin/python");
         let named = [without[0], ("GRIDWEAVE_PYTHON", interpreter.to_str().unwrap())];
         gridweave_with(self.folder.path(), &["check", "python.toml"], &named).assert(0, &[]);
@@ -233,14 +238,14 @@ impl Python {
     }
 
     fn golden_cases_pass_and_a_difference_is_shown(&self) {
-        let cases = repository().join("stages/python/examples/golden");
+        let cases = repository().join("pipelines/python/examples/golden");
         let args = ["golden", "--partial", "--cases", cases.to_str().unwrap()];
         self.gridweave(&args).assert(0, &["python/invert"]);
     }
 
     fn walls_by_opencv_are_as_good_for_a_merge(&self) {
         simulate(self.folder.path(), "small.mcap", &SMALL_BUILDING);
-        let pipeline = repository().join("stages/python/examples/tag_merge_opencv.toml");
+        let pipeline = repository().join("pipelines/python/examples/tag_merge_opencv.toml");
         let shipped = fs::read_to_string(repository().join("pipelines/tag_merge.toml")).unwrap();
         let (swapped, body) =
             (fs::read_to_string(&pipeline).unwrap(), |text: &str| text[text.find("[robots]").unwrap()..].to_owned());
@@ -263,8 +268,7 @@ fn copy(from: &Path, to: &Path) {
     for entry in fs::read_dir(from).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap();
-        let is_built =
-            name == "build" || name == "__pycache__" || path.extension().is_some_and(|end| end == "egg-info");
+        let is_built = name == "__pycache__" || name.as_encoded_bytes().starts_with(b"_native");
         match path.is_dir() {
             _ if is_built => {}
             true => copy(&path, &to.join(name)),
@@ -276,7 +280,7 @@ fn copy(from: &Path, to: &Path) {
 #[test]
 #[ignore = "needs python3 with venv, and the network"]
 fn python_stages_are_stages_as_any_other() {
-    let python = Python::new(&[]);
+    let python = Python::new(&["matplotlib", "tqdm"]);
     simulate(python.folder.path(), "robots.mcap", &TWO_ROBOTS);
     python.unit_tests_pass();
     python.what_is_wrong_is_underlined_before_anything_runs();

@@ -29,24 +29,31 @@ pub(crate) struct MergeArgs {
 
 /// Merges the maps of logs or of map files.
 pub(crate) fn merge(args: &MergeArgs, registry: &Registry) -> Result<Status> {
-    let pipeline = match Inputs::of(&args.inputs)? {
-        Inputs::TopologyFiles => "topology_file_merge",
-        Inputs::Logs if has_only_tags(args)? => "tag_frames",
-        Inputs::Logs => match &robots_without_maps(args)?[..] {
-            [] => "auto_merge",
-            robots => {
-                let robots = robots.join(", ");
-                eprint_line(format_args!("the log has no map of {robots}: maps are built from scans (scan_merge)"));
-                "scan_merge"
-            }
-        },
-        Inputs::MapFiles => "map_file_merge",
-    };
+    let pipeline = args.pipeline()?;
     let (output, options) = match is_yaml(&args.output) {
         true => (Output::MapOnly, with_map(args)?),
         false => (Output::Log(&args.output), args.options.clone()),
     };
     Job { pipeline: Path::new(pipeline), inputs: &args.inputs, output, options: &options, registry }.run_and_print()
+}
+
+impl MergeArgs {
+    /// Finds the shipped pipeline that fits the inputs.
+    pub(crate) fn pipeline(&self) -> Result<&'static str> {
+        Ok(match Inputs::of(&self.inputs)? {
+            Inputs::TopologyFiles => "topology_file_merge",
+            Inputs::Logs if has_only_tags(self)? => "tag_frames",
+            Inputs::Logs => match &robots_without_maps(self)?[..] {
+                [] => "auto_merge",
+                robots => {
+                    let robots = robots.join(", ");
+                    eprint_line(format_args!("the log has no map of {robots}: maps are built from scans (scan_merge)"));
+                    "scan_merge"
+                }
+            },
+            Inputs::MapFiles => "map_file_merge",
+        })
+    }
 }
 
 /// Whether logs have tags and no maps, so that only frames can be estimated, and no map is asked for. Logs that cannot be read are

@@ -27,7 +27,7 @@ use gridweave_logs::bag::Bag;
 use gridweave_logs::file::replace;
 use gridweave_logs::names::robot_names;
 use gridweave_logs::sink::close_log;
-use gridweave_runtime::engine::{self, EngineKind, processes};
+use gridweave_runtime::engine::{self, EngineKind, Observer, RunError, RunReport, processes};
 use gridweave_runtime::pipeline::{Mode, Overrides, Pipeline};
 use gridweave_runtime::stage::Registry;
 use progress::Progress;
@@ -54,6 +54,14 @@ impl<'a> From<Option<&'a Path>> for Output<'a> {
     fn from(log: Option<&'a Path>) -> Self {
         log.map_or(Self::OfPipeline, Self::Log)
     }
+}
+
+/// Who watches a run.
+pub(crate) enum Watcher<'a> {
+    /// The user at a terminal: progress is shown, and an interrupt ends the run.
+    Terminal,
+    /// A program.
+    Observer(&'a dyn Observer),
 }
 
 /// A run of a pipeline by the options of the command line.
@@ -85,8 +93,13 @@ impl Job<'_> {
         })
     }
 
-    /// Runs the pipeline and writes all outputs.
+    /// Runs the pipeline and writes all outputs. Shows the progress, and ends in order when the user interrupts it.
     pub(crate) fn run(&self) -> Result<RunSummary> {
+        self.run_with(|_| (), Watcher::Terminal)
+    }
+
+    /// The same with the stages that `attach` adds, and another watcher of the run.
+    pub(crate) fn run_with(&self, attach: impl FnOnce(&mut Pipeline), watcher: Watcher<'_>) -> Result<RunSummary> {
         let bag = self.bag()?;
         let mut pipeline = shipped::load(self.pipeline, &self.overrides(bag.as_ref())?, self.registry)?;
         if self.output == Output::MapOnly {
@@ -95,22 +108,22 @@ impl Job<'_> {
         outputs::check(&pipeline, self.options)?;
         provenance::record(&mut pipeline);
         let sinks = ResultSinks::attach(&mut pipeline, self.options)?;
+        attach(&mut pipeline);
         if let Some(address) = &self.options.view {
             let address = view::attach(&mut pipeline, self.registry, address)?;
             eprint_line(format_args!(
                 "to see this run in Foxglove, open the connection \"Foxglove WebSocket\" {address}"
             ));
         }
-        let progress = Progress::new(pipeline.mode);
-        let by_mode = match pipeline.mode {
-            Mode::Replay => EngineKind::default(),
-            Mode::Live => EngineKind::Processes,
+        let report = match watcher {
+            Watcher::Observer(observer) => self.engine_run(&pipeline, observer)?,
+            Watcher::Terminal => {
+                let progress = Progress::new(pipeline.mode);
+                let report = self.engine_run(&pipeline, &progress)?;
+                progress.finish();
+                report
+            }
         };
-        let report = match self.options.engine.unwrap_or(by_mode) {
-            EngineKind::Processes => processes::run(&pipeline, &logging::launch()?, &progress),
-            engine => engine::run(&pipeline, engine, &progress),
-        };
-        progress.finish();
         if let Err(error) = &report {
             close_outputs(&pipeline, &error.to_string());
         }
@@ -127,6 +140,17 @@ impl Job<'_> {
         }
         sinks.check_written(&report)?;
         Ok(summary)
+    }
+
+    fn engine_run(&self, pipeline: &Pipeline, observer: &dyn Observer) -> Result<Result<RunReport, RunError>> {
+        let by_mode = match pipeline.mode {
+            Mode::Replay => EngineKind::default(),
+            Mode::Live => EngineKind::Processes,
+        };
+        Ok(match self.options.engine.unwrap_or(by_mode) {
+            EngineKind::Processes => processes::run(pipeline, &logging::launch()?, observer),
+            engine => engine::run(pipeline, engine, observer),
+        })
     }
 
     /// Creates the rosbag2 folder for the log, if the output is one.

@@ -130,6 +130,7 @@ pub fn run(pipeline: &Pipeline, engine: EngineKind, observer: &dyn Observer) -> 
         }
         EngineKind::Processes => {
             let launch = processes::Launch::this_program()
+                .map(|program| program.with("stage"))
                 .map_err(|error| RunError::of_run(Failure::Process(format!("cannot find this program: {error}"))))?;
             processes::run(pipeline, &launch, observer)
         }

@@ -1,6 +1,7 @@
 //! Adding stages to a pipeline, and removing them, after it was loaded.
 
 use super::binding::accepts;
+use super::order::order;
 use super::topics::default_topics;
 use super::{DEFAULT_DEPTH, Overflow, Pipeline, Restart, StageSpec, Wire};
 use crate::stage::{InputPort, OutputPort, StageKind};
@@ -45,7 +46,29 @@ impl Pipeline {
             overflow: Vec::<Overflow>::new(),
             restart: Restart::default(),
         });
+        self.restore_order();
         true
+    }
+
+    /// Puts the stages into the order in which a pipeline file with them is loaded, as processes of a run do.
+    fn restore_order(&mut self) {
+        let mut by_name: Vec<usize> = (0..self.stages.len()).collect();
+        by_name.sort_by(|&a, &b| self.stages[a].name.cmp(&self.stages[b].name));
+        let mut rank = vec![0; by_name.len()];
+        by_name.iter().enumerate().for_each(|(position, &stage)| rank[stage] = position);
+        let wires =
+            self.stages.iter().enumerate().flat_map(|(to, stage)| stage.inputs.iter().map(move |wire| (wire, to)));
+        let edges = wires.map(|(wire, to)| (rank[wire.from_stage], rank[to])).collect();
+        // A stage that nothing reads closes no cycle.
+        let Ok(sorted) = order(by_name.len(), &edges) else { return };
+        let mut new_indexes = vec![0; by_name.len()];
+        sorted.iter().enumerate().for_each(|(new, &rank)| new_indexes[by_name[rank]] = new);
+        let mut stages: Vec<(usize, StageSpec)> = new_indexes.iter().copied().zip(self.stages.drain(..)).collect();
+        stages.sort_by_key(|(index, _)| *index);
+        self.stages.extend(stages.into_iter().map(|(_, stage)| stage));
+        for wire in self.stages.iter_mut().flat_map(|stage| &mut stage.inputs) {
+            wire.from_stage = new_indexes[wire.from_stage];
+        }
     }
 
     /// Removes all stages of a kind that has no outputs.
@@ -81,8 +104,8 @@ mod tests {
         let mut pipeline = valid();
         let kind = registry().get("line_extractor").unwrap().clone();
         assert!(pipeline.attach(&kind, toml::Table::new(), "more", |_, _, output| output.topic == Some("/map")));
-        let added = pipeline.stages.last().unwrap();
-        assert_eq!((added.name.as_str(), added.process.as_str()), ("line_extractor", "more"));
+        let added = pipeline.stages.iter().find(|stage| stage.name == "line_extractor").unwrap();
+        assert_eq!(added.process, "more");
         assert_eq!(added.topics.len(), kind.outputs.len(), "its readers need them");
         let from: Vec<&str> = added.inputs.iter().map(|wire| pipeline.stages[wire.from_stage].name.as_str()).collect();
         assert_eq!(from, ["fuse"]);
@@ -98,7 +121,24 @@ mod tests {
         let outputs: usize = pipeline.stages.iter().map(|stage| stage.kind.outputs.len()).sum();
         let kind = registry().get("mcap_sink").unwrap().clone();
         assert!(pipeline.attach(&kind, toml::Table::new(), "more", |_, _, _| true));
-        assert_eq!(pipeline.stages.last().unwrap().inputs.len(), outputs);
+        let added = pipeline.stages.iter().find(|stage| stage.name == "mcap_sink").unwrap();
+        assert_eq!(added.inputs.len(), outputs);
+    }
+
+    #[test]
+    fn a_pipeline_with_an_attached_stage_is_loaded_in_the_same_order() {
+        let mut pipeline = valid();
+        let sink = registry().get("mcap_sink").unwrap().clone();
+        // It reads the first stage only, so it comes before those that read others, though it was added after them.
+        let parameters = toml::Table::from_iter([("file".to_owned(), toml::Value::from("b.mcap"))]);
+        assert!(pipeline.attach(&sink, parameters, "more", |_, from, _| from.name == "log"));
+        let loaded = Pipeline::parse("again.toml", &pipeline.to_toml(), &registry(), &Overrides::default()).unwrap();
+        let stages = |pipeline: &Pipeline| {
+            let of = |stage: &crate::pipeline::StageSpec| (stage.name.clone(), stage.inputs.clone());
+            pipeline.stages.iter().map(of).collect::<Vec<_>>()
+        };
+        assert_ne!(pipeline.stages.last().unwrap().name, "mcap_sink");
+        assert_eq!(stages(&pipeline), stages(&loaded));
     }
 
     #[test]

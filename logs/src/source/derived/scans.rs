@@ -4,8 +4,10 @@ use super::super::RobotMessages;
 use super::super::channel::Route;
 use crate::robots::{LidarPoses, RobotChannels, Scans, read_scan};
 use crate::tf::is_static;
+use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::TFMessage;
 use gridweave_runtime::stage::{Output, StageError};
+use std::collections::BTreeMap;
 
 /// Transforms scans to the base frames of their robots.
 pub(super) struct DerivedScans {
@@ -13,16 +15,23 @@ pub(super) struct DerivedScans {
     scans: Option<Scans>,
     /// The poses of lidars that the user has set.
     lidars: LidarPoses,
+    /// The log time of the first scan from a lidar without a mount, by robot and frame, where the mount may still come.
+    unmounted: Option<BTreeMap<(String, String), LogTime>>,
 }
+
+/// How long a live source waits for the mount of a lidar, seconds of log time. Static transforms are sent to whoever joins, at once.
+const MOUNT_TIMEOUT: f64 = 5.0;
 
 impl DerivedScans {
     /// Creates the derivation for robots with the base frame `base_frame`, or one of the usual names.
     pub(super) fn new(base_frame: Option<&str>, roles: &RobotChannels, lidars: LidarPoses) -> Self {
-        Self { scans: roles.scanned().next().map(|_| Scans::new(base_frame, lidars.clone())), lidars }
+        Self { scans: roles.scanned().next().map(|_| Scans::new(base_frame, lidars.clone())), lidars, unmounted: None }
     }
 
-    /// Tracks the mounting poses of lidars before any channel with scans is known.
+    /// Tracks the mounting poses of lidars before any channel with scans is known, in a live run. A scan may come before the mount of
+    /// its lidar, and is left out.
     pub(super) fn expect_sensors(&mut self, base_frame: Option<&str>) {
+        self.unmounted.get_or_insert_default();
         self.scans.get_or_insert_with(|| Scans::new(base_frame, self.lidars.clone()));
     }
 
@@ -49,6 +58,12 @@ impl DerivedScans {
         };
         let frame = &scan.header.frame_id;
         if !scans.knows_mount(&route.robot, frame) {
+            if let Some(unmounted) = &mut self.unmounted {
+                let first = *unmounted.entry((route.robot.clone(), frame.clone())).or_insert(output.log_time());
+                if output.log_time().seconds_since(first) < MOUNT_TIMEOUT {
+                    return Ok(());
+                }
+            }
             output.warn(format!(
                 "tf has no transform from `{frame}`, the frame of `{topic}`, to the base of {}: the lidar is taken to be at \
                  the base and to look ahead. If it does not, log its mount on /tf_static, or set it: \

@@ -8,11 +8,13 @@ mod tests;
 pub(super) use stage::INTERVAL;
 pub use stage::MapFileSource;
 
+use crate::map_file::GridMap;
 use gridweave_runtime::ros::OccupancyGrid;
-use gridweave_runtime::stage::{Out, OutputPorts, Outputs, Parameters, StageKind};
+use gridweave_runtime::stage::{Context, Out, OutputPorts, Outputs, Parameters, StageKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// The parameters of `map_file_source`.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
@@ -37,6 +39,15 @@ pub fn kind() -> StageKind {
         "Reads map files (YAML and image of nav2's map server), each as the map of a robot. Files have no time: the maps \
          are logged one second apart, the first one second after the epoch, in the order of the robots' names",
         MapFileSource::new,
+    )
+}
+
+/// The kind `map_file_source` for maps that are in memory, each with the name of its robot, instead of files.
+pub fn kind_of_maps(maps: Vec<(String, Arc<GridMap>)>) -> StageKind {
+    StageKind::source(
+        "map_file_source",
+        "Sends maps that a program holds, each as the map of a robot, as from files",
+        move |(), context: &Context| Ok(MapFileSource::of_maps(&maps, context)),
     )
 }
 

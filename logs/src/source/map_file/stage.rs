@@ -1,7 +1,7 @@
 //! The stage `map_file_source`.
 
 use super::{FileMaps, MapFileSourceParameters};
-use crate::map_file::{self, Thresholds};
+use crate::map_file::{self, GridMap, Thresholds};
 use crate::names::robot_names;
 use crate::qos;
 use crate::schemas::schema_text;
@@ -9,6 +9,7 @@ use gridweave_runtime::message::{Channel, FixedText, LogTime, MessageHeader};
 use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, encode};
 use gridweave_runtime::stage::{Context, Output, Source, StageError};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// The interval of log times. Files have no time, and 0 is "no time" in ROS, so the first map is logged one interval
 /// after the epoch. The interval is long enough for each map to be processed before the next.
@@ -24,9 +25,14 @@ pub struct MapFileSource {
 /// A map, and the name of its robot.
 struct NamedMap {
     robot: String,
-    file: PathBuf,
     topic: String,
-    thresholds: Thresholds,
+    map: Origin,
+}
+
+/// Where a map comes from.
+enum Origin {
+    File(PathBuf, Thresholds),
+    Memory(Arc<GridMap>),
 }
 
 impl MapFileSource {
@@ -39,13 +45,23 @@ impl MapFileSource {
         }
         let names = robot_names(&parameters.files).map_err(|error| StageError::new(doing(), error))?;
         let thresholds = if parameters.literal_thresholds { Thresholds::Literal } else { Thresholds::ByPicture };
-        let named = |(robot, file): (String, PathBuf)| {
+        let files = parameters.files.into_iter().map(|file| Origin::File(file, thresholds));
+        Ok(Self::named(names.into_iter().zip(files), context))
+    }
+
+    /// A source of maps that are in memory, each with the name of its robot.
+    pub(super) fn of_maps(maps: &[(String, Arc<GridMap>)], context: &Context) -> Self {
+        Self::named(maps.iter().map(|(robot, map)| (robot.clone(), Origin::Memory(Arc::clone(map)))), context)
+    }
+
+    fn named(maps: impl Iterator<Item = (String, Origin)>, context: &Context) -> Self {
+        let named = |(robot, map): (String, Origin)| {
             let topic = context.robots.map.replace("{robot}", &robot);
-            NamedMap { robot, file, topic, thresholds }
+            NamedMap { robot, topic, map }
         };
-        let mut maps: Vec<NamedMap> = names.into_iter().zip(parameters.files).map(named).collect();
+        let mut maps: Vec<NamedMap> = maps.map(named).collect();
         maps.sort_by(|one, other| one.robot.cmp(&other.robot));
-        Ok(Self { maps, sent: 0 })
+        Self { maps, sent: 0 }
     }
 }
 
@@ -69,12 +85,21 @@ impl Source for MapFileSource {
 impl NamedMap {
     /// Sends the map on a channel for itself, as a log would.
     fn send(&self, channel_number: u32, output: &Output<FileMaps>) -> Result<(), StageError> {
-        let doing = || format!("send the map {}", self.file.display());
-        let loaded = map_file::load_as(&self.file, self.thresholds);
-        let (map, warning) = loaded.map_err(|error| StageError::new("read a map file", error))?;
-        if let Some(warning) = warning {
-            output.warn(format!("{}: {warning}", self.file.display()));
+        match &self.map {
+            Origin::Memory(map) => self.send_map(map, channel_number, output),
+            Origin::File(file, thresholds) => {
+                let loaded = map_file::load_as(file, *thresholds);
+                let (map, warning) = loaded.map_err(|error| StageError::new("read a map file", error))?;
+                if let Some(warning) = warning {
+                    output.warn(format!("{}: {warning}", file.display()));
+                }
+                self.send_map(&map, channel_number, output)
+            }
         }
+    }
+
+    fn send_map(&self, map: &GridMap, channel_number: u32, output: &Output<FileMaps>) -> Result<(), StageError> {
+        let doing = || format!("send the map of {}", self.robot);
         let time = output.log_time();
         let header = Header::new(time, format!("{}/map", self.robot));
         let message = OccupancyGrid { header, info: map.info, data: bytemuck::cast_slice(&map.cells) };

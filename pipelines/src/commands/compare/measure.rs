@@ -7,6 +7,7 @@ use crate::interrupt::stop_on_interrupt;
 use crate::status::Status;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
+use gridweave_runtime::engine::processes::Launch;
 use nix::sys::resource::{UsageWho, getrusage};
 use nix::sys::time::TimeValLike;
 use serde::{Deserialize, Serialize};
@@ -44,9 +45,9 @@ pub(super) struct Usage {
 pub(crate) fn measure(args: &MeasureArgs) -> Result<Status> {
     // A run that is interrupted ends in order, and this waits for it.
     stop_on_interrupt("the run is ended");
-    let program = std::env::current_exe().context("cannot find the program itself")?;
+    let Launch { program, arguments } = Launch::this_program().context("cannot find the program itself")?;
     let start = Instant::now();
-    let ended = Command::new(&program).args(&args.command).status();
+    let ended = Command::new(&program).args(arguments).args(&args.command).status();
     let ended = ended.with_context(|| format!("cannot start {}", program.display()))?;
     let time_s = start.elapsed().as_secs_f64();
     let used = getrusage(UsageWho::RUSAGE_CHILDREN).context("cannot measure the time and memory of the run")?;

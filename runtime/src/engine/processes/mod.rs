@@ -33,6 +33,7 @@ pub use system::{describe_exit, memory_of_process};
 use super::{Observer, RunError, RunReport};
 use crate::pipeline::Pipeline;
 use std::path::PathBuf;
+use std::sync::OnceLock;
 
 /// The command line of a process of a run: PROGRAM ARGUMENTS FOLDER PROCESS. The program must call [`run_process`] with the
 /// folder, the name, and the stage kinds of the program that started it.
@@ -44,10 +45,33 @@ pub struct Launch {
     pub arguments: Vec<String>,
 }
 
+/// The command line that starts this program again, where it runs within an interpreter.
+static THIS_PROGRAM: OnceLock<Launch> = OnceLock::new();
+
 impl Launch {
-    /// The current program with the command `stage`.
+    /// The current program.
+    ///
+    /// # Errors
+    /// The system does not say which program this is.
     pub fn this_program() -> std::io::Result<Self> {
-        Ok(Self { program: std::env::current_exe()?, arguments: vec!["stage".to_owned()] })
+        match THIS_PROGRAM.get() {
+            Some(set) => Ok(set.clone()),
+            None => Ok(Self { program: std::env::current_exe()?, arguments: Vec::new() }),
+        }
+    }
+
+    /// Makes this the command line of [`this_program`](Self::this_program), for a program that runs within an interpreter. Only the
+    /// first call has an effect.
+    pub fn set_this_program(self) {
+        // The command line of a process does not change.
+        let _ = THIS_PROGRAM.set(self);
+    }
+
+    /// The same with one more argument, such as the command `stage`.
+    #[must_use]
+    pub fn with(mut self, argument: &str) -> Self {
+        self.arguments.push(argument.to_owned());
+        self
     }
 }
 

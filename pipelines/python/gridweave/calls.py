@@ -11,7 +11,7 @@ from typing import Any
 import iceoryx2 as iox2
 
 from .msg import encode_into, size
-from .stage import PROTOCOL, About
+from .stages import PROTOCOL, About
 
 #: How many samples may wait for the other side.
 CREDITS = 16

@@ -16,7 +16,7 @@ from gridweave import msg
 from gridweave.calls import CREDITS, HELD, Header, What
 from gridweave.load import load
 from gridweave.msg.nav_msgs import OccupancyGrid
-from gridweave.stage import PROTOCOL
+from gridweave.stages import PROTOCOL
 
 STAGE = '''
 import os, signal, threading, time
@@ -84,7 +84,7 @@ class Host:
         self.subscriber = services[1].subscriber_builder().create()
         self.prefix = prefix
         self.module = module
-        self.process = subprocess.Popen([sys.executable, "-m", "gridweave.run", module, str(path)], stdin=subprocess.PIPE,
+        self.process = subprocess.Popen([sys.executable, "-m", "gridweave.program", module, str(path)], stdin=subprocess.PIPE,
                                         stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         assert self.process.stdout.read(1) == b"r"
 

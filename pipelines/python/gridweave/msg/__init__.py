@@ -16,10 +16,10 @@ The parser and the encoding are those of the package `rosbags`.
 """
 
 import dataclasses
+import functools
 import re
 import sys
 import types
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,13 +27,9 @@ from rosbags.interfaces import Nodetype
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-__all__ = ["decode", "define", "encode", "ros_type"]
+from .._native import GridweaveError, message_texts
 
-
-def _texts() -> Path:
-    """The folder of the `.msg` texts: in the package or, where it runs from the repository, their home there."""
-    packaged = Path(__file__).parent / "texts"
-    return packaged if packaged.is_dir() else Path(__file__).parents[5] / "logs" / "msg"
+__all__ = ["decode", "decode_as", "define", "encode", "ros_type"]
 
 
 _NUMPY = {"float32": "f4", "float64": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4",
@@ -125,17 +121,7 @@ def _add(texts: dict[str, str]) -> None:
         setattr(module, short, _STORE.types[name])
 
 
-def _load() -> None:
-    texts = {}
-    for path in sorted(_texts().rglob("*.msg")):
-        package = path.relative_to(_texts()).parts[0]
-        texts[f"{package}/msg/{path.stem}"] = path.read_text()
-    if not texts:
-        raise ImportError(f"there are no message texts in {_texts()}: install the package by `pip install stages/python`")
-    _add(texts)
-
-
-_load()
+_add(message_texts())
 
 
 def define(name: str, text: str) -> type:
@@ -195,6 +181,31 @@ def decode(message_class: type, data: memoryview) -> Any:
     Raises `SerdeError` if it is no such message.
     """
     return _STORE.deserialize_cdr(data, ros_type(message_class))
+
+
+def decode_as(name: str, text: str, data: bytes) -> Any:
+    """Reads a message of a log, whose type has the definition `text` there (`ros2msg`), with all types that it uses; without one it is
+    that of the same name here.
+
+    Raises `GridweaveError` if the definition or the message cannot be read.
+    """
+    try:
+        return _store_of(name, text).deserialize_cdr(data, name)
+    except Exception as error:  # noqa: BLE001: the parser has its own, and gets others from what it reads
+        raise GridweaveError(f"a message of the type {name} cannot be read: {error}") from error
+
+
+@functools.lru_cache(maxsize=1024)
+def _store_of(name: str, text: str) -> Any:
+    """The types by which a log has written its messages: those here if they are the same."""
+    if not text:
+        return _STORE
+    parsed = get_types_from_msg(text, name)
+    if all(_STORE.fielddefs.get(other) == definition for other, definition in parsed.items()):
+        return _STORE
+    store = get_typestore(Stores.EMPTY)
+    store.register(parsed)
+    return store
 
 
 def size(message: Any) -> int:

@@ -5,7 +5,7 @@ import importlib.util
 import sys
 from pathlib import Path
 
-from .stage import Stage
+from .stages import Stage
 
 
 def load(module: str) -> type[Stage]:

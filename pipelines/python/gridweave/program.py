@@ -1,4 +1,4 @@
-"""`python -m gridweave.run MODULE FOLDER`: the program of a stage, which a pipeline starts.
+"""`python -m gridweave.program MODULE FOLDER`: the program of a stage, which a pipeline starts.
 
 It speaks the protocol of a call, which is written down in `runtime/src/program/mod.rs`: one message at a time, in the order that the
 stage gets them.
@@ -16,7 +16,7 @@ from typing import Any, Callable, Iterator
 from .calls import Calls, What
 from .load import load
 from .msg import SerdeError, decode
-from .stage import About, Context, Stage
+from .stages import About, Context, Stage
 
 
 class Program:
@@ -82,7 +82,7 @@ class Program:
 
 
 def _input() -> type:
-    from .stage import Input
+    from .stages import Input
 
     return Input
 

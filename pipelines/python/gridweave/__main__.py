@@ -1,0 +1,17 @@
+"""The command `gridweave`, also as `python -m gridweave`."""
+
+import signal
+import sys
+
+from . import _native
+
+
+def main() -> None:
+    """Runs the command, and exits with its status."""
+    # An interrupt before the command has its own handler ends the program, without a traceback.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    sys.exit(_native.command([sys.executable, "-m", "gridweave"], sys.argv[1:]))
+
+
+if __name__ == "__main__":
+    main()
