@@ -201,7 +201,8 @@ mod tests {
         let frame = summary.frames["b"];
         assert!((frame.x + 0.6).abs() < 0.03 && (frame.y + 0.35).abs() < 0.03 && frame.yaw.abs() < 0.01, "{frame:?}");
         let map = merged.map.unwrap();
-        assert_eq!(map.cells.iter().filter(|cell| **cell > 50).count() / 100, 8, "the walls lie on each other");
+        let walls = |cells: &[i8]| cells.iter().filter(|cell| **cell > 50).count();
+        assert_eq!(walls(&map.cells), walls(&maps[0].1.cells), "the walls lie on each other");
 
         let folder = tempfile::tempdir().unwrap();
         let files = maps.map(|(name, map)| {
