@@ -1,6 +1,6 @@
 //! `python`: a stage that is written in Python.
 //!
-//! The package `gridweave` in [`pipelines/python`](../python/README.md) is the other side: asked by `python -m gridweave.describe
+//! The package `gridweave` in [`pipelines/python`](../../pipelines/python/STAGES.md) is the other side: asked by `python -m gridweave.describe
 //! MODULE`, it prints the ports and parameters of the stage, and `python -m gridweave.program MODULE FOLDER` is its program. The
 //! protocol between the two is that of every [`program`].
 

@@ -186,7 +186,7 @@ class MergeResult:
         self._rerun(file)
 
     def plot(self, axes: Any = None) -> Any:
-        """Draws the merged map and the frame of each robot with matplotlib, and returns the axes."""
+        """Draws the merged map and the frame of each robot, by an arrow of 1 m along its x, with matplotlib, and returns the axes."""
         import matplotlib.pyplot as plt
 
         axes = axes or plt.subplots(layout="constrained")[1]
@@ -194,10 +194,10 @@ class MergeResult:
             shade = np.where(self.map.cells < 0, 70.0, 100.0 - self.map.cells)
             axes.imshow(shade, origin="lower", extent=self.map.extent, cmap="gray", vmin=0, vmax=100, interpolation="nearest")
         for number, (robot, frame) in enumerate(self.frames.items()):
-            length = 1.0
-            axes.annotate("", (frame.x + length * math.cos(frame.yaw), frame.y + length * math.sin(frame.yaw)), (frame.x, frame.y),
-                          arrowprops={"arrowstyle": "->", "color": f"C{number}", "lw": 2})
-            axes.text(frame.x, frame.y, f" {robot}", color=f"C{number}")
+            ahead = (frame.x + math.cos(frame.yaw), frame.y + math.sin(frame.yaw))
+            arrow = {"arrowstyle": "->", "color": f"C{number}", "lw": 2, "shrinkA": 0, "shrinkB": 0}
+            axes.annotate("", ahead, (frame.x, frame.y), arrowprops=arrow)
+            axes.text(*ahead, f" {robot}", color=f"C{number}", va="center")
         axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
         return axes
 
