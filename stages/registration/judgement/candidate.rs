@@ -1,7 +1,7 @@
 //! A candidate: hypotheses at one relative pose, and the agreement of the maps there.
 
 use super::Terms;
-use crate::registration::comparison::{Agreement, ComparisonParameters, Deformed, MapView, compare};
+use crate::registration::comparison::{Agreement, ComparisonParameters, Deformed};
 use crate::registration::{Basis, Hypothesis};
 use crate::shared::geometry::{Point2, Pose2, point_jacobian};
 use nalgebra::Matrix3;
@@ -35,26 +35,23 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// Compares the maps at a hypothesis, without deformation.
-    pub(super) fn new(
-        (number, hypothesis): (usize, &Hypothesis),
-        a: &MapView<'_>,
-        b: &MapView<'_>,
-        parameters: &ComparisonParameters,
-    ) -> Self {
-        let agreement = compare(a, b, &hypothesis.transform_a_b, parameters);
+    /// A hypothesis at which the maps agree so much, without deformation.
+    pub(super) fn new((number, hypothesis): (usize, &Hypothesis), agreement: Agreement) -> Self {
         let hypothesis = hypothesis.clone();
         let (others, numbers) = (Vec::new(), Vec::new());
         Self { hypothesis, number, others, numbers, agreement, deformed: None, left_by_deformation: None }
     }
 
-    /// Deforms map b, where that can explain contradictions.
-    pub(super) fn deform(mut self, a: &MapView<'_>, b: &MapView<'_>, parameters: &ComparisonParameters) -> Self {
-        let is_worth_it = parameters.bend > 0.0
+    /// Whether a deformation of map b can explain contradictions.
+    pub(super) fn is_worth_deforming(&self, parameters: &ComparisonParameters) -> bool {
+        parameters.bend > 0.0
             && !self.hypothesis.is_refused
             && self.agreement.evidence > 0.0
-            && self.agreement.inlier_ratio() < CLEAR_AGREEMENT;
-        let deformed = is_worth_it.then(|| Deformed::new(a, b, &self.hypothesis.transform_a_b, parameters)).flatten();
+            && self.agreement.inlier_ratio() < CLEAR_AGREEMENT
+    }
+
+    /// Applies a deformation of map b, if it explains more than it costs.
+    pub(super) fn deform(mut self, deformed: Option<Deformed>) -> Self {
         self.left_by_deformation = deformed.map(|deformed| deformed.covariance);
         self.deformed =
             deformed.filter(|deformed| deformed.agreement.evidence - deformed.cost > self.agreement.evidence);

@@ -2,10 +2,11 @@
 
 use super::priors::prior;
 use super::verdict::{Rival, Verdict};
-use super::{Candidate, JudgementParameters, Listed, Refusal, Term};
+use super::{Candidate, Comparisons, JudgementParameters, Listed, Refusal, Term};
 use crate::registration::comparison::{ComparisonParameters, MapView};
 use crate::registration::pose_window::PoseWindow;
 use crate::registration::{Basis, Hypothesis};
+use crate::shared::geometry::Pose2;
 
 /// What the user knows about a pair of robots.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -29,8 +30,21 @@ pub fn judge(
     known: &UserKnowledge,
     parameters: &JudgementParameters,
 ) -> Option<Verdict> {
+    judge_again(a, b, hypotheses, known, parameters, &mut Comparisons::default())
+}
+
+/// The same for maps that may have been judged before, with the comparisons of that time.
+pub fn judge_again(
+    a: &MapView<'_>,
+    b: &MapView<'_>,
+    hypotheses: &[Hypothesis],
+    known: &UserKnowledge,
+    parameters: &JudgementParameters,
+    comparisons: &mut Comparisons,
+) -> Option<Verdict> {
+    comparisons.begin();
     let comparison = parameters.comparison();
-    let mut all = compared(a, b, hypotheses, &comparison);
+    let mut all = compared(a, b, hypotheses, &comparison, comparisons);
     if let Some(window) = &known.window {
         let is_possible = |candidate: &Candidate| window.contains(&candidate.hypothesis.transform_a_b, 0.0, 0.0);
         if !all.iter().any(is_possible) {
@@ -43,7 +57,7 @@ pub fn judge(
     let is_expected = known.window.is_some();
     let count = all.len();
     let chosen = known.hypothesis.map(|asked| (asked, asked.checked_sub(1).and_then(|index| all.get(index).cloned())));
-    let candidates = deformed(all, a, b, &comparison);
+    let candidates = deformed(all, a, b, &comparison, comparisons);
     let log_odds: Vec<f64> = candidates.iter().map(|candidate| log_odds(candidate, is_expected)).collect();
     let probabilities = posterior(&log_odds);
     if let Some((asked, chosen)) = chosen {
@@ -52,7 +66,8 @@ pub fn judge(
             candidates.iter().zip(&probabilities).find(|(candidate, _)| chosen.is_none() || candidate.has(number))?;
         let refusal = chosen.is_none().then_some(Refusal::NoSuchHypothesis { asked, count });
         // The chosen pose is used, and not another one of its candidate.
-        let candidate = chosen.map_or_else(|| found.clone(), |chosen| chosen.deform(a, b, &comparison));
+        let chosen = chosen.and_then(|chosen| deformed(vec![chosen], a, b, &comparison, comparisons).pop());
+        let candidate = chosen.unwrap_or_else(|| found.clone());
         let chosen = refusal.is_none().then_some((asked, count));
         return Some(Verdict { refusal, chosen, listed, probability: *probability, ..Verdict::of(candidate) });
     }
@@ -78,7 +93,9 @@ pub fn candidates(
     hypotheses: &[Hypothesis],
     parameters: &ComparisonParameters,
 ) -> Vec<Candidate> {
-    deformed(merged(compared(a, b, hypotheses, parameters)), a, b, parameters)
+    let mut comparisons = Comparisons::default();
+    let all = merged(compared(a, b, hypotheses, parameters, &mut comparisons));
+    deformed(all, a, b, parameters, &mut comparisons)
 }
 
 /// Agreement of the maps at each hypothesis, without deformation, the best first.
@@ -87,9 +104,12 @@ fn compared(
     b: &MapView<'_>,
     hypotheses: &[Hypothesis],
     parameters: &ComparisonParameters,
+    comparisons: &mut Comparisons,
 ) -> Vec<Candidate> {
-    let compare = |numbered| Candidate::new(numbered, a, b, parameters);
-    let mut all: Vec<Candidate> = hypotheses.iter().enumerate().map(compare).collect();
+    let poses: Vec<Pose2> = hypotheses.iter().map(|hypothesis| hypothesis.transform_a_b).collect();
+    let agreements = comparisons.agreements(a, b, &poses, parameters);
+    let numbered = hypotheses.iter().enumerate().zip(agreements);
+    let mut all: Vec<Candidate> = numbered.map(|(numbered, agreement)| Candidate::new(numbered, agreement)).collect();
     // What tags determine comes first, then what has most evidence; equals stay in the order of their sources and
     // ranks.
     all.sort_by(|one, other| {
@@ -106,8 +126,16 @@ fn deformed(
     a: &MapView<'_>,
     b: &MapView<'_>,
     parameters: &ComparisonParameters,
+    comparisons: &mut Comparisons,
 ) -> Vec<Candidate> {
-    merged(candidates.into_iter().map(|candidate| candidate.deform(a, b, parameters)).collect())
+    let worth = candidates.iter().filter(|candidate| candidate.is_worth_deforming(parameters));
+    let poses: Vec<Pose2> = worth.map(|candidate| candidate.hypothesis.transform_a_b).collect();
+    let mut found = comparisons.deformations(a, b, &poses, parameters).into_iter();
+    let deform = |candidate: Candidate| match candidate.is_worth_deforming(parameters) {
+        true => candidate.deform(found.next().flatten()),
+        false => candidate.deform(None),
+    };
+    merged(candidates.into_iter().map(deform).collect())
 }
 
 /// Probability of each of several exclusive hypotheses by their log-odds against none of them: `exp(s_i) / (1 + sum

@@ -10,6 +10,7 @@
 //! recorded and simulated ones, cross-validated by building.
 
 mod candidate;
+mod comparisons;
 mod judge;
 mod parameters;
 mod priors;
@@ -23,7 +24,8 @@ pub mod weights;
 mod tests;
 
 pub use candidate::Candidate;
-pub use judge::{UserKnowledge, candidates, judge, posterior};
+pub use comparisons::Comparisons;
+pub use judge::{UserKnowledge, candidates, judge, judge_again, posterior};
 pub use parameters::JudgementParameters;
 pub use refusal::{Listed, Refusal};
 pub use self_similarity::{Alias, SelfSimilarity};

@@ -1,9 +1,9 @@
 //! Cache of the self-similarity of the robots' maps, so that not every map is searched.
 
-use crate::registration::comparison::MapView;
+use crate::registration::comparison::{Agreement, MapView};
 use crate::registration::judgement::{Alias, JudgementParameters, SelfSimilarity, Verdict};
 use crate::registration::pose_window::PoseWindow;
-use crate::shared::geometry::is_known;
+use crate::shared::geometry::{Pose2, is_known};
 use crate::shared::robot_pair::RobotPair;
 use std::collections::BTreeMap;
 
@@ -12,7 +12,21 @@ const LITTLE_CHANGE: f64 = 0.2;
 
 /// Self-similarity of maps, by robot.
 #[derive(Debug, Default)]
-pub(super) struct SelfSimilarities(BTreeMap<String, Searched>);
+pub(super) struct SelfSimilarities {
+    searched: BTreeMap<String, Searched>,
+    /// The last alias of each pair, and what it was found for.
+    aliases: BTreeMap<RobotPair, (Asked, Option<Alias>)>,
+}
+
+/// What the alias of a pair depends on.
+#[derive(Debug, PartialEq)]
+struct Asked {
+    /// Numbers of the maps of both robots, and of those that were searched.
+    maps: [u64; 4],
+    transform_a_b: Pose2,
+    agreement: Agreement,
+    window: Option<PoseWindow>,
+}
 
 #[derive(Debug)]
 struct Searched {
@@ -36,8 +50,20 @@ impl SelfSimilarities {
     ) -> Option<Alias> {
         self.search(&pair.a, a, parameters);
         self.search(&pair.b, b, parameters);
-        let (of_a, of_b) = (self.0.get(&pair.a)?, self.0.get(&pair.b)?);
-        Alias::likeliest(verdict, (a.1, &of_a.found), (b.1, &of_b.found), window, parameters)
+        let (of_a, of_b) = (self.searched.get(&pair.a)?, self.searched.get(&pair.b)?);
+        let candidate = &verdict.candidate;
+        let asked = Asked {
+            maps: [a.0, b.0, of_a.number, of_b.number],
+            transform_a_b: candidate.transform_a_b(),
+            agreement: candidate.agreement,
+            window: window.copied(),
+        };
+        if let Some((_, alias)) = self.aliases.get(pair).filter(|(known, _)| *known == asked) {
+            return alias.clone();
+        }
+        let alias = Alias::likeliest(verdict, (a.1, &of_a.found), (b.1, &of_b.found), window, parameters);
+        self.aliases.insert(pair.clone(), (asked, alias.clone()));
+        alias
     }
 
     /// Searches a map of a robot, unless an earlier result is still valid.
@@ -46,16 +72,20 @@ impl SelfSimilarities {
         let holds = |searched: &Searched| {
             searched.known_cells.abs_diff(known_cells) as f64 <= LITTLE_CHANGE * searched.known_cells as f64
         };
-        if !self.0.get(robot).is_some_and(holds) {
+        if !self.searched.get(robot).is_some_and(holds) {
             let found = SelfSimilarity::new(map, parameters);
-            self.0.insert(robot.to_owned(), Searched { number, known_cells, found });
+            self.searched.insert(robot.to_owned(), Searched { number, known_cells, found });
         }
     }
 
     /// Drops the results of maps that are not the latest of their robot, of which `last` returns the number. Returns
     /// those robots.
     pub(super) fn forget_former(&mut self, last: impl Fn(&str) -> Option<u64>) -> Vec<String> {
-        self.0.extract_if(.., |robot, searched| last(robot) != Some(searched.number)).map(|(robot, _)| robot).collect()
+        let searched = &mut self.searched;
+        searched
+            .extract_if(.., |robot, searched| last(robot) != Some(searched.number))
+            .map(|(robot, _)| robot)
+            .collect()
     }
 }
 
@@ -73,10 +103,10 @@ mod tests {
             [(0, up_to(10.0), 0), (1, up_to(11.0), 0), (2, up_to(14.0), 2), (3, up_to(15.0), 2)]
         {
             kept.search("robot1", (number, &map.view()), &parameters);
-            assert_eq!(kept.0["robot1"].number, searched, "map {number}");
+            assert_eq!(kept.searched["robot1"].number, searched, "map {number}");
         }
         assert_eq!(kept.forget_former(|_| Some(2)), Vec::<String>::new());
         assert_eq!(kept.forget_former(|robot| (robot == "robot1").then_some(3)), ["robot1"]);
-        assert!(kept.0.is_empty());
+        assert!(kept.searched.is_empty());
     }
 }

@@ -6,7 +6,7 @@ use super::self_similarities::SelfSimilarities;
 use crate::registration::Hypothesis;
 use crate::registration::comparison::{Agreement, Deformed, MapView};
 use crate::registration::hypotheses::{HypothesisGatherer, Origin};
-use crate::registration::judgement::{JudgementParameters, Verdict, judge};
+use crate::registration::judgement::{Comparisons, JudgementParameters, Verdict, judge_again};
 use crate::shared::geometry::row_by_row;
 use crate::shared::robot_maps::{RobotMap, RobotMaps};
 use crate::shared::robot_pair::RobotPair;
@@ -46,6 +46,8 @@ pub(super) struct MergeVerifier {
     maps: RobotMaps<WallsOnDemand>,
     gatherer: HypothesisGatherer,
     hypotheses: BTreeMap<Origin, Vec<Alignment>>,
+    /// Comparisons of the maps of each pair, with the numbers of both maps.
+    comparisons: BTreeMap<RobotPair, ((u64, u64), Comparisons)>,
     /// Peaks of a search, for pairs whose hypotheses come from other sources.
     map_searches: MapSearches,
     /// Self-similarity of maps that were accepted without tags.
@@ -64,6 +66,7 @@ impl MergeVerifier {
             maps: RobotMaps::default(),
             gatherer: HypothesisGatherer::default(),
             hypotheses: BTreeMap::new(),
+            comparisons: BTreeMap::new(),
             map_searches: MapSearches::default(),
             self_similarities: SelfSimilarities::default(),
             sent: BTreeMap::new(),
@@ -143,11 +146,18 @@ impl MergeVerifier {
         let verdict = maps.and_then(|(a, b)| {
             let mut hypotheses: Vec<Hypothesis> = proposed.iter().filter_map(|one| Hypothesis::of(one)).collect();
             let (view_a, view_b) = (view(a), view(b));
-            let mut verdict = judge(&view_a, &view_b, &hypotheses, &known, &self.parameters)?;
+            let (numbers, comparisons) = self.comparisons.entry(pair.clone()).or_default();
+            if *numbers != (a.number, b.number) {
+                (*numbers, *comparisons) = ((a.number, b.number), Comparisons::default());
+            }
+            let mut judge = |hypotheses: &[Hypothesis]| {
+                judge_again(&view_a, &view_b, hypotheses, &known, &self.parameters, comparisons)
+            };
+            let mut verdict = judge(&hypotheses)?;
             if MapSearches::is_due(&hypotheses, &verdict) {
                 let grids = ((a.number, a.grid()), (b.number, b.grid()));
                 hypotheses.extend_from_slice(self.map_searches.of(pair, grids, &known));
-                verdict = judge(&view_a, &view_b, &hypotheses, &known, &self.parameters)?;
+                verdict = judge(&hypotheses)?;
             }
             if !verdict.rests_on_maps_alone() {
                 return Some(verdict);
