@@ -44,10 +44,9 @@ def merge(
     """
     named = inputs if isinstance(inputs, Mapping) else None
     given = list(named.values()) if named is not None else _listed(inputs)
-    settings = {"reference": reference, "initial": initial, "accept": accept, "parameters": parameters, "seed": seed}
 
     def run(output: str | PathLike[str] | None, progress: Progress = False) -> tuple[str, Any]:
-        asked = request(output=output, **settings)
+        asked = request(reference=reference, initial=initial, accept=accept, parameters=parameters, seed=seed, output=output)
         with watch(progress, "merge") as report:
             if named is None and all(isinstance(one, (str, PathLike)) for one in given):
                 return _native.merge_files(given, asked, report)

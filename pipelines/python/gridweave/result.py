@@ -105,7 +105,7 @@ class StageStatistics:
 class MergeResult:
     """Where the maps of the robots lie to each other, the merged map, and the reasons."""
 
-    def __init__(self, summary: str, grid: Any, rerun: Callable[[str | PathLike[str]], None]):
+    def __init__(self, summary: str, grid: Any, rerun: Callable[..., Any]):
         #: The summary as `gridweave merge --summary` writes it.
         self.summary: dict[str, Any] = json.loads(summary)
         #: The merged map in the frame of the reference; None if there is none.

@@ -108,7 +108,7 @@ def _make(name: str, constants: Any, fields: Any) -> type:
 
 def _add(texts: dict[str, str]) -> None:
     """Makes types of texts, which may use each other and those that are there."""
-    parsed = {}
+    parsed: dict[str, Any] = {}
     for name, text in texts.items():
         parsed |= get_types_from_msg(text, name)
     _STORE.register(parsed)
