@@ -88,12 +88,15 @@ pub fn run_pipeline(
 /// Merges maps that are in memory, each with the name of its robot.
 ///
 /// # Errors
-/// Two maps have the same name, there is none, or the request is wrong; or the observer stops the run.
+/// Two maps have the same name, a name is no part of a topic, there is no map, or the request is wrong; or the observer stops the run.
 pub fn merge_maps(
     maps: Vec<(String, Arc<GridMap>)>,
     request: &MergeRequest,
     observer: &dyn Observer,
 ) -> Result<Merged> {
+    if let Some((name, _)) = maps.iter().find(|(name, _)| name.is_empty() || name.contains(['/', '{', '}'])) {
+        return Err(BadUse(format!("`{name}` is no name of a robot: its topics are /ROBOT/map and others")).into());
+    }
     let mut names = BTreeSet::new();
     if let Some((twice, _)) = maps.iter().find(|(name, _)| !names.insert(name)) {
         return Err(BadUse(format!("two maps are of `{twice}`: give each robot a name of its own")).into());
@@ -218,7 +221,8 @@ mod tests {
     fn what_cannot_be_merged_is_bad_use() {
         let map = Arc::new(room((0, 0)));
         let twice = vec![("a".to_owned(), Arc::clone(&map)), ("a".to_owned(), Arc::clone(&map))];
-        for maps in [Vec::new(), twice] {
+        let named = |name: &str| vec![("a".to_owned(), Arc::clone(&map)), (name.to_owned(), Arc::clone(&map))];
+        for maps in [Vec::new(), twice, named(""), named("b/c"), named("{robot}")] {
             assert!(crate::is_bad_use(&merge_maps(maps, &MergeRequest::default(), &()).unwrap_err()));
         }
         assert!(crate::is_bad_use(&merge_files(&[], &MergeRequest::default(), &()).unwrap_err()));

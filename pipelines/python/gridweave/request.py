@@ -20,14 +20,23 @@ def request(
     output: str | PathLike[str] | None,
 ) -> _native.Request:
     """The settings as the command line has them."""
+    if seed is not None and not 0 <= seed < 1 << 64:
+        raise _native.RequestError(f"a seed is a number from 0 on of at most 64 bits, and not {seed}")
     return _native.Request(
         reference=reference,
-        initial=[f"{robot}={','.join(repr(float(number)) for number in pose)}" for robot, pose in (initial or {}).items()],
+        initial=[f"{robot}={_pose(robot, pose)}" for robot, pose in (initial or {}).items()],
         accept=[f"{robot}={number}" for robot, number in (accept or {}).items()],
         settings=[f"{name}={_toml(value)}" for name, value in (parameters or {}).items()],
         seed=seed,
         output=output,
     )
+
+
+def _pose(robot: str, pose: Sequence[float]) -> str:
+    try:
+        return ",".join(repr(float(number)) for number in pose)
+    except (TypeError, ValueError):
+        raise _native.RequestError(f"the initial pose of `{robot}` is (x, y, yaw) in numbers, and not {pose!r}") from None
 
 
 def _toml(value: Any) -> str:

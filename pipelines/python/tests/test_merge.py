@@ -111,6 +111,9 @@ class MergeTest(unittest.TestCase):
             ([room()], {"resolution": 0.05, "parameters": {"icp.nonsense": 1}}, "nonsense"),
             ([room()], {"resolution": 0.05, "parameters": {"icp.nonsense": object()}}, "a parameter is"),
             ([room(), room()], {"resolution": 0.05, "reference": "nobody"}, "nobody"),
+            ([room()], {"resolution": 0.05, "initial": {"robot1": ("x", 0, 0)}}, "initial pose of `robot1`"),
+            ([room()], {"resolution": 0.05, "seed": -1}, "seed"),
+            ({"": room(), "b": room()}, {"resolution": 0.05}, "no name of a robot"),
             (["no/such/file.yaml"], {}, "no/such/file.yaml"),
         ]:
             with self.subTest(text), self.assertRaisesRegex(GridweaveError, text):
