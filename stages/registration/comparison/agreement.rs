@@ -154,8 +154,8 @@ fn chance(map: &MapView<'_>, tolerance: f64) -> f64 {
     (0.5 * 2.0 * tolerance * length / known.max(1.0)).clamp(CHANCE_RANGE.0, CHANCE_RANGE.1)
 }
 
-/// Area that both maps know, square metres.
-fn overlap(a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2) -> f64 {
+/// Area that both maps know with map b at `transform_a_b`, square metres.
+pub fn overlap(a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2) -> f64 {
     let samples = b.walls.samples.iter();
     let known = samples.filter(|sample| is_known(a.value_at(&(transform_a_b * sample.point)))).count();
     known as f64 * b.walls.sample_area

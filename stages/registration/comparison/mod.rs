@@ -13,6 +13,6 @@ mod parameters;
 mod regions;
 mod straight_walls;
 
-pub use agreement::{Agreement, MapView, compare};
+pub use agreement::{Agreement, MapView, compare, overlap};
 pub use deformed::Deformed;
 pub use parameters::ComparisonParameters;

@@ -21,6 +21,8 @@ pub(super) struct Iteration<'a> {
     first_guess: &'a FirstGuess,
     parameters: &'a IcpParameters,
     measurements: Vec<Measurement>,
+    /// For each point of b, the wall of a that was nearest when it was last paired.
+    partners: Vec<u32>,
     state: IterationState,
 }
 
@@ -37,10 +39,11 @@ pub(super) struct IterationState {
     pub(super) mean_square_error: f64,
 }
 
-/// The transform after an iteration, and the root mean square motion of the points, metres.
+/// The transform after an iteration, and the motion to it.
 pub(super) struct Change {
     pub(super) transform_a_b: Pose2,
-    pub(super) length: f64,
+    /// In local coordinates, metres: its length is the root mean square motion of the points.
+    pub(super) motion: Vector3<f64>,
 }
 
 impl<'a> Iteration<'a> {
@@ -58,7 +61,8 @@ impl<'a> Iteration<'a> {
             inliers: 0,
             mean_square_error: 0.0,
         };
-        Self { a, b, first_guess, parameters, measurements: Vec::new(), state }
+        let partners = vec![u32::MAX; b.walls.points().len()];
+        Self { a, b, first_guess, parameters, measurements: Vec::new(), partners, state }
     }
 
     /// Estimate of the last iteration.
@@ -95,7 +99,7 @@ impl<'a> Iteration<'a> {
         }
         let mean_square_error = equations.mean_square_error;
         self.state = IterationState { frame, information, covariance, inliers, mean_square_error };
-        Some(Change { transform_a_b: frame.moved(transform_a_b, &change), length: change.norm() })
+        Some(Change { transform_a_b: frame.moved(transform_a_b, &change), motion: change })
     }
 
     /// Root of the weighted mean of the squared residuals of the last iteration, before its step, metres.
@@ -135,9 +139,11 @@ impl<'a> Iteration<'a> {
         let (mut sum, mut squares) = (Vector2::zeros(), 0.0);
         let origin = transform_a_b.translation.vector;
         let usual = distance / 3.0;
-        for (point_b, normal_b) in b.walls.points().iter().zip(&b.normals).step_by(stride) {
+        let points_b = b.walls.points().iter().zip(&b.normals).zip(&mut self.partners);
+        for ((point_b, normal_b), last_partner) in points_b.step_by(stride) {
             let point = transform_a_b * point_b;
-            let Some(partner) = a.walls.nearest(&point, distance) else { continue };
+            let Some(partner) = a.walls.nearest_from(&point, distance, *last_partner as usize) else { continue };
+            *last_partner = partner.index as u32;
             let offset = point - a.walls.points()[partner.index];
             let normal = a.normals[partner.index];
             let arm = point.coords - origin;

@@ -6,6 +6,9 @@ use crate::shared::geometry::{Point2, Pose2};
 use crate::shared::walls::{WallMap, stride};
 use nalgebra::{Matrix3, Vector3};
 
+/// Iterations after which a pose may come again, and how near, as a share of the last motion.
+const LONGEST_CYCLE: usize = 12;
+const CYCLE_DEVIATION: f64 = 0.01;
 /// At most this many rotations to either side of the first guess are tried.
 const MOST_STARTS: usize = 10;
 
@@ -61,14 +64,14 @@ pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: 
     }
     let (mut transform_a_b, mut errors) =
         best.map_or((first_guess.transform_a_b, Vec::new()), |(_, transform, errors)| (transform, errors));
-    let (mut converged, mut last_change) = (false, 0.0);
+    let (mut converged, mut motions) = (false, Vec::new());
     for _ in 0..parameters.max_iterations {
         let Some(change) = iteration.run(&transform_a_b, parameters.min_distance, 1) else { break };
         transform_a_b = change.transform_a_b;
         errors.push(iteration.error());
-        last_change = change.length;
-        converged = change.length < parameters.convergence;
-        if converged {
+        motions.push(change.motion);
+        converged = change.motion.norm() < parameters.convergence;
+        if converged || is_cycle(&motions) {
             break;
         }
     }
@@ -76,7 +79,7 @@ pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: 
     let state = iteration.into_state();
     let frame = state.frame;
     // If the iterations oscillate between partners, the uncertainty is at least the amplitude.
-    let unsettled = if converged { 0.0 } else { last_change.powi(2) };
+    let unsettled = if converged { 0.0 } else { motions.last().map_or(0.0, Vector3::norm_squared) };
     let covariance = state.covariance + Matrix3::from_diagonal_element(unsettled);
     let (jacobian, inverse) = (frame.jacobian(&transform_a_b), frame.inverse_jacobian(&transform_a_b));
     let metres_to_radians = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1.0 / frame.scale));
@@ -94,6 +97,17 @@ pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: 
         radius: frame.scale,
         step: first_guess.distance(&transform_a_b, &frame, parameters),
     }
+}
+
+/// Whether the last motions lead back to a pose before them, as where points alternate between partners.
+fn is_cycle(motions: &[Vector3<f64>]) -> bool {
+    let Some(last) = motions.last() else { return false };
+    let within = CYCLE_DEVIATION * last.norm();
+    let sums = motions.iter().rev().take(LONGEST_CYCLE).scan(Vector3::zeros(), |sum: &mut Vector3<f64>, motion| {
+        *sum += motion;
+        Some(sum.norm())
+    });
+    sums.skip(1).any(|distance| distance < within)
 }
 
 /// Iterates on a sample of the points while the distance of partners shrinks. Returns the transform and the error of

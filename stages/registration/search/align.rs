@@ -4,7 +4,7 @@ use super::peaks::{change, is_near, overlay};
 use super::prepared_map::JUDGED;
 use super::significance::{OTHERS, significance};
 use super::{
-    CommonWalls, MapAlignerParameters, Peaks, PreparedMap, ScoredPose, SearchRefusal, covariance, refine_peak,
+    CommonWalls, MapAlignerParameters, Overlay, Peaks, PreparedMap, ScoredPose, SearchRefusal, covariance, refine_peak,
 };
 use crate::registration::pose_window::PoseWindow;
 use crate::shared::geometry::{Grid, Pose2};
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 /// Number of peaks that are refined beyond the number of hypotheses, as several may converge to one pose.
 const SPARE: usize = 2;
-/// Number of self-similar poses: each shift comes with its inverse.
+/// Number of self-similar poses: each comes with its inverse.
 const SELF_SIMILAR: usize = 5;
 
 /// A hypothesis of the relative pose of two maps.
@@ -114,14 +114,21 @@ pub fn align_prepared(
 }
 
 /// The best poses of a map on itself, other than the identity: `T_map_map` of poses at which the building may be
-/// self-similar, the best first.
-pub fn self_similar_poses(map: &PreparedMap, parameters: &MapAlignerParameters) -> Vec<Pose2> {
+/// self-similar, the best first. Only those are refined whose common walls are `is_enough`.
+pub fn self_similar_poses(
+    map: &PreparedMap,
+    parameters: &MapAlignerParameters,
+    is_enough: impl Fn(&Pose2, &CommonWalls) -> bool,
+) -> Vec<Pose2> {
     let (peaks, here) = (Peaks::find(map, map, None, parameters), Pose2::identity());
-    let itself = overlay(map, map, JUDGED, parameters.free_space_penalty).common_walls(&here);
-    let (Some(best), Some(itself)) = (peaks.all().first(), itself) else { return Vec::new() };
-    let all = MapAlignerParameters { max_hypotheses: 1 + SELF_SIMILAR, least_share: 0.0, ..parameters.clone() };
-    let found = hypotheses(&peaks, best.score, map, map, &all).into_iter().map(|found| found.alignment.transform_a_b);
-    found.filter(|pose| !is_near(&here, pose, &itself.centre, parameters)).collect()
+    let judged = overlay(map, map, JUDGED, parameters.free_space_penalty);
+    let (Some(best), Some(itself)) = (peaks.all().first(), judged.common_walls(&here)) else { return Vec::new() };
+    let is_elsewhere = |pose: &Pose2| !is_near(&here, pose, &itself.centre, parameters);
+    let mut apart = distinct(&peaks, 1 + SELF_SIMILAR + SPARE, &judged, parameters);
+    apart.retain(|(peak, common)| is_elsewhere(&peak.transform_a_b) && is_enough(&peak.transform_a_b, common));
+    let all = MapAlignerParameters { max_hypotheses: SELF_SIMILAR, least_share: 0.0, ..parameters.clone() };
+    let found = refined(&apart, best.score, map, map, &all).into_iter();
+    found.map(|found| found.alignment.transform_a_b).filter(is_elsewhere).collect()
 }
 
 /// Hypothesis at the peak near a given pose, without a search. `None` if the walls of the maps do not meet there, or
@@ -153,18 +160,46 @@ fn hypotheses(
 ) -> Vec<Hypothesis> {
     let judged = overlay(a, b, JUDGED, parameters.free_space_penalty);
     let looked_at = parameters.max_hypotheses.saturating_add(SPARE);
+    let apart = distinct(peaks, OTHERS.max(looked_at) + 1, &judged, parameters);
+    let looked_at = &apart[..apart.len().min(looked_at)];
+    let mut hypotheses = refined(looked_at, best_score, a, b, parameters);
+    for found in &mut hypotheses {
+        let others = apart.iter().filter(|(peak, _)| !found.is_near(&peak.transform_a_b, parameters));
+        let others: Vec<f64> = others.map(|(peak, _)| peak.score).collect();
+        found.alignment.significance = significance(found.alignment.score, &others);
+    }
+    hypotheses
+}
+
+/// At most `most` peaks, each apart from the better ones, with their common walls.
+fn distinct(
+    peaks: &Peaks,
+    most: usize,
+    judged: &Overlay<'_>,
+    parameters: &MapAlignerParameters,
+) -> Vec<(ScoredPose, CommonWalls)> {
     let mut apart: Vec<(ScoredPose, CommonWalls)> = Vec::new();
     for peak in peaks.all() {
         let is_same = |(known, common): &(ScoredPose, CommonWalls)| {
             is_near(&known.transform_a_b, &peak.transform_a_b, &common.centre, parameters)
         };
-        if apart.len() <= OTHERS.max(looked_at) && !apart.iter().any(is_same) {
+        if apart.len() < most && !apart.iter().any(is_same) {
             apart.extend(judged.common_walls(&peak.transform_a_b).map(|common| (*peak, common)));
         }
     }
-    let refined = apart[..apart.len().min(looked_at)]
-        .par_iter()
-        .filter_map(|(peak, common)| Hypothesis::at(peak, best_score, common, a, b, parameters));
+    apart
+}
+
+/// Hypotheses at some peaks, each apart from the better ones.
+fn refined(
+    peaks: &[(ScoredPose, CommonWalls)],
+    best_score: f64,
+    a: &PreparedMap,
+    b: &PreparedMap,
+    parameters: &MapAlignerParameters,
+) -> Vec<Hypothesis> {
+    let refined =
+        peaks.par_iter().filter_map(|(peak, common)| Hypothesis::at(peak, best_score, common, a, b, parameters));
     let mut hypotheses: Vec<Hypothesis> = Vec::new();
     for found in refined.collect::<Vec<_>>() {
         // Poses on the slope of a peak converge to its top.
@@ -175,11 +210,6 @@ fn hypotheses(
         }
     }
     hypotheses.truncate(parameters.max_hypotheses);
-    for found in &mut hypotheses {
-        let others = apart.iter().filter(|(peak, _)| !found.is_near(&peak.transform_a_b, parameters));
-        let others: Vec<f64> = others.map(|(peak, _)| peak.score).collect();
-        found.alignment.significance = significance(found.alignment.score, &others);
-    }
     hypotheses
 }
 

@@ -26,19 +26,30 @@ pub fn coordinate_ascent(score: impl Fn(&Pose2) -> f64, start: &Pose2, centre: &
     let mut best = ScoredPose { transform_a_b: *start, score: score(start) };
     let Steps { mut metres, mut radians, halvings } = steps;
     let mut halved = 0;
+    // Steps that are known to be no better from the best pose, by axis: to the left, and to the right.
+    let mut is_worse = [[false; 2]; 3];
     for _ in 0..MOST_ROUNDS {
         let from = best;
         for axis in 0..3 {
-            let beside = |direction: f64| {
-                let mut step = Vector3::zeros();
-                step[axis] = direction * if axis == 2 { radians } else { metres };
-                let transform_a_b = moved(&best.transform_a_b, centre, &step);
-                ScoredPose { transform_a_b, score: score(&transform_a_b) }
-            };
-            let (left, right) = (beside(-1.0), beside(1.0));
-            let better = if right.score > left.score { right } else { left };
-            if better.score > best.score {
-                best = better;
+            let step = if axis == 2 { radians } else { metres };
+            let beside = [-step, step].map(|step| {
+                let mut change = Vector3::zeros();
+                change[axis] = step;
+                moved(&best.transform_a_b, centre, &change)
+            });
+            let mut better = None;
+            for (side, transform_a_b) in beside.into_iter().enumerate() {
+                if !std::mem::replace(&mut is_worse[axis][side], true) {
+                    let beside = ScoredPose { transform_a_b, score: score(&transform_a_b) };
+                    let least = better.map_or(best.score, |(_, better): (usize, ScoredPose)| better.score);
+                    better = if beside.score > least { Some((side, beside)) } else { better };
+                }
+            }
+            if let Some((side, beside)) = better {
+                best = beside;
+                // The step back leads to where it came from.
+                is_worse = [[false; 2]; 3];
+                is_worse[axis][1 - side] = true;
             }
         }
         if best == from {
@@ -46,6 +57,7 @@ pub fn coordinate_ascent(score: impl Fn(&Pose2) -> f64, start: &Pose2, centre: &
                 break;
             }
             (metres, radians, halved) = (0.5 * metres, 0.5 * radians, halved + 1);
+            is_worse = [[false; 2]; 3];
         }
     }
     best

@@ -1,9 +1,9 @@
 //! Score of every translation of one map on another, at one rotation and at the opposite one.
 
 use super::fourier::{Buffers, Fourier};
-use super::raster::{Content, Raster};
-use super::walk::Walk;
-use nalgebra::{UnitComplex, Vector2};
+use super::known_cells::KnownCells;
+use super::raster::Content;
+use nalgebra::Vector2;
 use rustfft::num_complex::Complex32;
 
 /// Scores translations of map b on map a.
@@ -47,10 +47,10 @@ pub struct ScoredShift {
 }
 
 impl Correlator {
-    /// Correlator of a raster `a` with rasters b of the same cell size whose map, turned, is at most `size_b` metres
+    /// Correlator of a map `a` with maps b in cells of the same size, of which each, turned, is at most `size_b` metres
     /// long along x and along y.
-    pub fn new(a: &Raster, size_b: Vector2<f64>, penalty: f64) -> Self {
-        let cell = 2.0 * a.cell;
+    pub fn new(a: &KnownCells<'_>, size_b: Vector2<f64>, penalty: f64) -> Self {
+        let cell = 2.0 * a.raster().cell;
         let (_, size_a) = a.box_turned(0.0);
         let cells = size_a.map(|side| cells_of(side, cell)) + size_b.map(|side| cells_of(side, cell));
         let fourier = Fourier::new(cells.x, cells.y);
@@ -75,8 +75,8 @@ impl Correlator {
         Workspace::new(&self.fourier)
     }
 
-    /// Scores all translations of raster `b` turned by `angle`, and by half a turn more, about the origin of its frame.
-    pub fn correlate(&self, b: &Raster, angle: f64, workspace: &mut Workspace) {
+    /// Scores all translations of map `b` turned by `angle`, and by half a turn more, about the origin of its frame.
+    pub fn correlate(&self, b: &KnownCells<'_>, angle: f64, workspace: &mut Workspace) {
         workspace.draw(&self.fourier, b, angle, self.cell);
         self.fourier.forward(&mut workspace.buffers, workspace.size.1);
         for_each_opposite(&self.fourier, &mut workspace.buffers.spectrum, |start, column, opposite| {
@@ -246,35 +246,32 @@ impl Workspace {
         Self { buffers: fourier.buffers(), corner: Vector2::zeros(), size: (0, 0) }
     }
 
-    /// Draws a turned raster into the plane: the share of each cell that is near a wall, and the share that is free.
-    fn draw(&mut self, fourier: &Fourier, raster: &Raster, angle: f64, cell: f64) {
-        let (least, size) = raster.box_turned(angle);
+    /// Draws a turned map into the plane: the share of each cell that is near a wall, and the share that is free.
+    fn draw(&mut self, fourier: &Fourier, map: &KnownCells<'_>, angle: f64, cell: f64) {
+        let (least, size) = map.box_turned(angle);
+        let side = map.raster().cell;
         // The least coordinates are in the middle of the first cell, so rounding cannot move them outside.
-        self.corner = least - Vector2::repeat(0.5 * raster.cell);
+        self.corner = least - Vector2::repeat(0.5 * side);
         self.size = (cells_of(size.x, cell).min(fourier.width), cells_of(size.y, cell).min(fourier.height));
         let plane = &mut self.buffers.plane;
         plane[..self.size.1 * fourier.width].fill(Complex32::new(0.0, 0.0));
-        let share = ((raster.cell * raster.cell) / (cell * cell)) as f32;
+        let share = ((side * side) / (cell * cell)) as f32;
         let (free, wall) = (Complex32::new(0.0, share), Complex32::new(share, 0.0));
         let mut values = [Complex32::new(0.0, 0.0); 4];
         values[Content::Free as usize] = free;
         values[Content::BesideWall as usize] = wall;
         values[Content::Wall as usize] = wall;
-        let turn = UnitComplex::new(angle);
-        let step = turn * Vector2::new(raster.cell, 0.0) / cell;
-        for (row, contents) in raster.cells.chunks(raster.width.max(1)).enumerate() {
-            let start = ((turn * raster.centre(0, row)).coords - self.corner) / cell;
-            for (place, content) in Walk::new(&start, &step, fourier.width).zip(contents) {
-                if let (true, Some(cell)) = (*content != Content::Unknown, plane.get_mut(place)) {
-                    *cell += values[*content as usize];
-                }
+        map.visit_turned(angle, &self.corner, cell, fourier.width, |content, place| {
+            if let Some(cell) = plane.get_mut(place) {
+                *cell += values[content as usize];
             }
-        }
+        });
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::Raster;
     use super::*;
     use proptest::prelude::*;
 
@@ -312,7 +309,7 @@ mod tests {
     fn drawn(raster: &Raster, opposite: bool) -> (Vec<Vec<Complex32>>, Vector2<f64>) {
         let fourier = Fourier::new(16, 16);
         let mut workspace = Workspace::new(&fourier);
-        workspace.draw(&fourier, raster, 0.0, 2.0 * raster.cell);
+        workspace.draw(&fourier, &KnownCells::new(raster), 0.0, 2.0 * raster.cell);
         let (width, height) = workspace.size;
         let rows = workspace.buffers.plane.chunks(fourier.width).take(height);
         let mut rows: Vec<Vec<Complex32>> = rows.map(|row| row[..width].to_vec()).collect();
@@ -348,10 +345,11 @@ mod tests {
     proptest! {
         #[test]
         fn the_best_shift_is_the_one_that_counting_finds(a in any_raster(), b in any_raster()) {
-            let (_, size) = b.box_turned(0.0);
-            let correlator = Correlator::new(&a, size, 0.6);
+            let known_b = KnownCells::new(&b);
+            let (_, size) = known_b.box_turned(0.0);
+            let correlator = Correlator::new(&KnownCells::new(&a), size, 0.6);
             let mut workspace = correlator.workspace();
-            correlator.correlate(&b, 0.0, &mut workspace);
+            correlator.correlate(&known_b, 0.0, &mut workspace);
             for opposite in [false, true] {
                 let [forth, back] = correlator.best_of_blocks(&workspace, 2.0, 3);
                 let best = if opposite { back } else { forth };

@@ -1,6 +1,7 @@
 //! The search over all relative poses.
 
 use super::correlation::{Correlator, ScoredShift, Workspace};
+use super::known_cells::KnownCells;
 use super::raster::Raster;
 use crate::registration::pose_window::PoseWindow;
 use crate::shared::geometry::{Pose2, pose};
@@ -92,10 +93,11 @@ pub fn search(
     let (spacing, most_at_one) = if window.is_some() { (0.0, usize::MAX) } else { (spacing, MOST_AT_ONE) };
     let margin = 2.0 * a.cell;
     let may_lie = |pose: &ScoredPose| window.is_none_or(|window| window.contains(&pose.transform_a_b, margin, step));
-    let size_b = angles.iter().fold(Vector2::zeros(), |most, angle| b.box_turned(*angle).1.sup(&most));
-    let correlator = Correlator::new(a, size_b, penalty);
+    let (known_a, known_b) = (KnownCells::new(a), KnownCells::new(b));
+    let size_b = angles.iter().fold(Vector2::zeros(), |most, angle| known_b.box_turned(*angle).1.sup(&most));
+    let correlator = Correlator::new(&known_a, size_b, penalty);
     let places_at = |workspace: &mut Workspace, angle: &f64| {
-        correlator.correlate(b, *angle, workspace);
+        correlator.correlate(&known_b, *angle, workspace);
         let shifts = correlator.best_of_blocks(workspace, spacing, most_at_one);
         let both = [*angle, angle + PI].into_iter().zip(shifts).flat_map(|(angle, shifts)| {
             shifts.into_iter().map(move |ScoredShift { translation, score }| ScoredPose {

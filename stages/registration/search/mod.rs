@@ -18,6 +18,7 @@ mod coordinate_ascent;
 mod correlation;
 mod exhaustive;
 mod fourier;
+mod known_cells;
 mod overlay;
 mod parameters;
 mod peak_shape;
@@ -36,6 +37,7 @@ pub use align::{MapAlignment, MapAlignments, NamedMap, align_maps, align_near, a
 pub use coordinate_ascent::{Steps, coordinate_ascent, refine_peak};
 pub use correlation::{Correlator, ScoredShift, Workspace};
 pub use exhaustive::{Rotations, ScoredPose, search};
+pub use known_cells::KnownCells;
 pub use overlay::{CommonWalls, Overlay, Walls};
 pub use parameters::MapAlignerParameters;
 pub use peak_shape::covariance;

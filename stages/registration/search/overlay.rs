@@ -1,6 +1,6 @@
 //! Score of one map on another at one relative pose.
 
-use super::raster::{Content, Raster};
+use super::raster::{Content, CellTransform, Raster};
 use crate::shared::geometry::{Point2, Pose2};
 use nalgebra::Vector2;
 use std::f64::consts::FRAC_PI_4;
@@ -17,6 +17,9 @@ const FRONT: f64 = 2.5;
 /// Bound of that distance, about the width of a corridor, metres.
 const MOST_AHEAD: f64 = 1.0;
 
+/// Bits of the count of the walls on one content: a quarter of a `u64`.
+const COUNT_BITS: u32 = 16;
+
 /// Evenly sampled points on the walls of a map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Walls {
@@ -29,12 +32,12 @@ pub struct Walls {
 
 impl Walls {
     /// Samples at most `most` points on the walls of a raster.
-    pub fn new(raster: &Raster, most: usize) -> Self {
+    pub fn new(raster: &Raster, most: u16) -> Self {
         let all: Vec<Point2> = raster.wall_cells().collect();
         // Cells beside walls are on both sides, however thick the walls are drawn, so they count one half.
         let beside = raster.cells.iter().filter(|content| **content == Content::BesideWall).count();
         let length = 0.5 * beside as f64 * raster.cell * WALL_PER_CELL;
-        let count = all.len().min(most);
+        let count = all.len().min(usize::from(most));
         let points: Vec<Point2> = (0..count).map(|number| all[number * all.len() / count]).collect();
         let faces = points.iter().map(|point| face(raster, point)).collect();
         Self { spacing: length / count.max(1) as f64, points, faces }
@@ -57,13 +60,12 @@ fn face(raster: &Raster, wall: &Point2) -> Option<Vector2<f64>> {
     is_one_sided.then(|| direction.normalize())
 }
 
-/// Whether a raster knows the space before a wall that another map has seen from one side, with the wall moved by
-/// `transform`.
-fn is_faced(raster: &Raster, transform: &Pose2, wall: &Point2, face: Option<Vector2<f64>>) -> bool {
+/// Whether a raster knows the space before a wall that another map has seen from one side.
+fn is_faced(raster: &Raster, to_cells: &CellTransform, wall: &Point2, face: Option<Vector2<f64>>) -> bool {
     let ahead = FRONT * raster.cell;
     // In wide cells the space before a wall may be narrower than that.
     let (Some(face), true) = (face, ahead <= MOST_AHEAD) else { return true };
-    raster.at(&(transform * (wall + face * ahead))) != Content::Unknown
+    raster.content(&to_cells.place(&(wall + face * ahead))) != Content::Unknown
 }
 
 /// Two maps, to be overlaid at any relative pose.
@@ -100,20 +102,23 @@ impl Overlay<'_> {
     /// Length of wall on wall, less `penalty` times that of wall on free space, metres: the mean of both maps.
     pub fn score(&self, transform_a_b: &Pose2) -> f64 {
         let values = self.values();
-        self.sum(transform_a_b, |raster, place| values[raster.content(place.x, place.y) as usize])
+        self.mean(transform_a_b, |walls, raster, to_cells| {
+            // The walls on each content are counted in one number, which takes one addition a wall.
+            let one_of_each: [u64; 4] = std::array::from_fn(|content| 1 << (content as u32 * COUNT_BITS));
+            let contents = walls.points.iter().map(|wall| raster.content(&to_cells.place(wall)));
+            let counts: u64 = contents.map(|content| one_of_each[content as usize]).sum();
+            let value = |(content, value): (u32, &f64)| {
+                (counts >> (content * COUNT_BITS) & ((1 << COUNT_BITS) - 1)) as f64 * value
+            };
+            (0..).zip(&values).map(value).sum()
+        })
     }
 
     /// The same, interpolated between the centres of cells, so that it is smooth in the pose.
     pub fn smooth_score(&self, transform_a_b: &Pose2) -> f64 {
         let values = self.values();
-        self.sum(transform_a_b, |raster, place| {
-            let within = |place: f64, count: usize| (place - 0.5).clamp(0.0, count as f64);
-            let (x, y) = (within(place.x, raster.width), within(place.y, raster.height));
-            let (right, up) = (x.fract(), y.fract());
-            let value = |x: f64, y: f64| values[raster.content(x, y) as usize];
-            let below = value(x, y) * (1.0 - right) + value(x + 1.0, y) * right;
-            let above = value(x, y + 1.0) * (1.0 - right) + value(x + 1.0, y + 1.0) * right;
-            below * (1.0 - up) + above * up
+        self.mean(transform_a_b, |walls, raster, to_cells| {
+            walls.points.iter().map(|wall| raster.interpolated(&values, &to_cells.place(wall))).sum()
         })
     }
 
@@ -121,16 +126,17 @@ impl Overlay<'_> {
     pub fn common_walls(&self, transform_a_b: &Pose2) -> Option<CommonWalls> {
         let (mut sum, mut squares, mut on_wall, mut on_free, mut faced) = (Vector2::zeros(), 0.0, 0.0, 0.0, 0.0);
         let middle = transform_a_b * self.walls_b.points.first()?;
+        let to_cells = self.a.cell_transform(transform_a_b);
         for (point, face) in self.walls_b.points.iter().zip(&self.walls_b.faces) {
             let wall = transform_a_b * point;
-            match self.a.at(&wall) {
+            match self.a.content(&to_cells.place(point)) {
                 Content::Wall | Content::BesideWall => {
                     // Differences from a nearby point, so that frames far away lose no digits.
                     let offset = wall - middle;
                     sum += offset;
                     squares += offset.norm_squared();
                     on_wall += 1.0;
-                    faced += f64::from(u8::from(is_faced(self.a, transform_a_b, point, *face)));
+                    faced += f64::from(u8::from(is_faced(self.a, &to_cells, point, *face)));
                 }
                 Content::Free => on_free += 1.0,
                 Content::Unknown => {}
@@ -150,24 +156,20 @@ impl Overlay<'_> {
     /// coincide, too.
     pub fn faced_score(&self, transform_a_b: &Pose2) -> f64 {
         let values = self.values();
-        let of = |walls: &Walls, raster: &Raster, transform: &Pose2| {
-            let values = walls.points.iter().zip(&walls.faces).map(|(wall, face)| {
-                let content = raster.at(&(transform * wall));
-                let counts = !content.is_near_wall() || is_faced(raster, transform, wall, *face);
+        self.mean(transform_a_b, |walls, raster, to_cells| {
+            let value = |(wall, face): (&Point2, &Option<Vector2<f64>>)| {
+                let content = raster.content(&to_cells.place(wall));
+                let counts = !content.is_near_wall() || is_faced(raster, to_cells, wall, *face);
                 if counts { values[content as usize] } else { 0.0 }
-            });
-            values.sum::<f64>() * walls.spacing
-        };
-        0.5 * (of(self.walls_b, self.a, transform_a_b) + of(self.walls_a, self.b, &transform_a_b.inverse()))
+            };
+            walls.points.iter().zip(&walls.faces).map(value).sum()
+        })
     }
 
-    fn sum(&self, transform_a_b: &Pose2, value: impl Fn(&Raster, Vector2<f64>) -> f64) -> f64 {
+    /// Mean of the values of b's walls on a and of a's walls on b, metres, where `sum` adds the values of single walls.
+    fn mean(&self, transform_a_b: &Pose2, sum: impl Fn(&Walls, &Raster, &CellTransform) -> f64) -> f64 {
         let of = |walls: &Walls, raster: &Raster, transform: &Pose2| {
-            // From the frame of the walls to cells of the raster.
-            let turn = transform.rotation.to_rotation_matrix().into_inner() / raster.cell;
-            let shift = (transform.translation.vector - raster.corner) / raster.cell;
-            let values = walls.points.iter().map(|wall| value(raster, turn * wall.coords + shift));
-            values.sum::<f64>() * walls.spacing
+            sum(walls, raster, &raster.cell_transform(transform)) * walls.spacing
         };
         0.5 * (of(self.walls_b, self.a, transform_a_b) + of(self.walls_a, self.b, &transform_a_b.inverse()))
     }

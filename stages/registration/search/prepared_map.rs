@@ -14,8 +14,8 @@ pub(crate) const JUDGED: usize = 1;
 const LEAST_CELLS: f64 = 1.5;
 
 /// Number of points on walls where a pose is scored, and in the ascent.
-const POINTS: usize = 1200;
-const FEW_POINTS: usize = 400;
+const POINTS: u16 = 1200;
+const FEW_POINTS: u16 = 400;
 
 /// A map in cells of several sizes, and its walls.
 #[derive(Clone, Debug, PartialEq)]

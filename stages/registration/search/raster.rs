@@ -2,7 +2,7 @@
 
 use super::walk::Walk;
 use crate::shared::geometry::{Cell, Grid, Point2, Pose2, is_free, is_known, is_occupied};
-use nalgebra::{UnitComplex, Vector2};
+use nalgebra::{Matrix2, Vector2};
 
 /// Number of cells around the known part: walls can be dilated into them, and still the outermost are unknown.
 const RIM: f64 = 3.0;
@@ -152,15 +152,6 @@ impl Raster {
         self.cells.iter().filter(|content| **content != Content::Unknown).count()
     }
 
-    /// Bounding box of the map turned by an angle about the origin of its frame: its lower corner, and its size,
-    /// metres.
-    pub(super) fn box_turned(&self, angle: f64) -> (Vector2<f64>, Vector2<f64>) {
-        let (turn, mut bounds) = (UnitComplex::new(angle), Bounds::default());
-        self.for_each_end(|point| bounds.add(&(turn * point)));
-        let (least, most) = bounds.0.unwrap_or_default();
-        (least, most - least)
-    }
-
     /// Visits the centres of the first and the last known cell of each row.
     fn for_each_end(&self, mut visit: impl FnMut(Point2)) {
         for (row, cells) in self.cells.chunks(self.width.max(1)).enumerate() {
@@ -176,17 +167,49 @@ impl Raster {
 
     /// Content at a point.
     pub fn at(&self, point: &Point2) -> Content {
-        let place = (point.coords - self.corner) / self.cell;
-        self.content(place.x, place.y)
+        self.content(&((point.coords - self.corner) / self.cell))
     }
 
     /// Content at a position given in cells from the corner. Positions outside are clamped to the outermost cells,
     /// which are unknown.
     #[inline]
-    pub(super) fn content(&self, x: f64, y: f64) -> Content {
-        let within = |place: f64, count: usize| (place as i32).clamp(0, count.saturating_sub(1) as i32) as usize;
-        let index = within(y, self.height) * self.width + within(x, self.width);
-        self.cells.get(index).copied().unwrap_or_default()
+    pub(super) fn content(&self, place: &Vector2<f64>) -> Content {
+        let (column, row) = self.within(place);
+        self.cells.get(whole(row) * self.width + whole(column)).copied().unwrap_or_default()
+    }
+
+    /// Values of the contents, interpolated between the centres of the cells, at a position given in cells from the
+    /// corner. An unknown cell has the value of the first.
+    #[inline]
+    pub(super) fn interpolated(&self, values: &[f64; 4], place: &Vector2<f64>) -> f64 {
+        let (x, y) = self.within(&(place - Vector2::repeat(0.5)));
+        let (column, row) = (whole(x), whole(y));
+        let (right, up) = (x - column as f64, y - row as f64);
+        // Beyond the last column is the first of the next row, which is unknown, too.
+        let value = |index: usize| values[self.cells.get(index).copied().unwrap_or_default() as usize];
+        let start = row * self.width + column;
+        let below = value(start) * (1.0 - right) + value(start + 1) * right;
+        let above = value(start + self.width) * (1.0 - right) + value(start + self.width + 1) * right;
+        below * (1.0 - up) + above * up
+    }
+
+    /// A position clamped to the raster, not beyond the middle of the last cells; what is not a number is at 0.
+    #[inline]
+    fn within(&self, place: &Vector2<f64>) -> (f64, f64) {
+        let clamped = |place: f64, count: usize| {
+            let most = count as f64 - 0.5;
+            let place = if place > 0.0 { place } else { 0.0 };
+            if place < most { place } else { most }
+        };
+        (clamped(place.x, self.width), clamped(place.y, self.height))
+    }
+
+    /// The transform to cells of the raster from another frame, whose pose in that of the raster is given.
+    pub(super) fn cell_transform(&self, transform: &Pose2) -> CellTransform {
+        CellTransform {
+            turn: transform.rotation.to_rotation_matrix().into_inner() / self.cell,
+            shift: (transform.translation.vector - self.corner) / self.cell,
+        }
     }
 
     /// The centres of the cells with walls, row by row.
@@ -222,6 +245,36 @@ impl Raster {
     }
 }
 
+/// A transform of points of another frame to positions in cells from the corner of a raster.
+pub(super) struct CellTransform {
+    turn: Matrix2<f64>,
+    shift: Vector2<f64>,
+}
+
+impl CellTransform {
+    /// Position of a point.
+    #[inline]
+    pub(super) fn place(&self, point: &Point2) -> Vector2<f64> {
+        self.turned(&point.coords) + self.shift
+    }
+
+    /// A direction, in cells.
+    #[inline]
+    pub(super) fn turned(&self, direction: &Vector2<f64>) -> Vector2<f64> {
+        self.turn * direction
+    }
+}
+
+/// Integer part of a value from 0 to 2^31; that of an integer may be one less.
+///
+/// Added to 1.5 * 2^52, a number is rounded to its lowest bits. That takes a fraction of the time of a cast, which
+/// checks for what is out of range, and the compiler can do it for two numbers at once.
+#[inline]
+fn whole(value: f64) -> usize {
+    const ROUND: f64 = 1.5 * (1_u64 << 52) as f64;
+    (value - 0.5 + ROUND).to_bits() as u32 as usize
+}
+
 impl Default for Raster {
     fn default() -> Self {
         Self { corner: Vector2::zeros(), cell: 1.0, width: 0, height: 0, cells: Vec::new() }
@@ -235,10 +288,10 @@ fn known_range<T>(row: &[T], is_known: impl Fn(&T) -> bool) -> Option<(usize, us
 
 /// Bounding box of points, if there are any.
 #[derive(Default)]
-struct Bounds(Option<(Vector2<f64>, Vector2<f64>)>);
+pub(super) struct Bounds(pub(super) Option<(Vector2<f64>, Vector2<f64>)>);
 
 impl Bounds {
-    fn add(&mut self, point: &Point2) {
+    pub(super) fn add(&mut self, point: &Point2) {
         let (least, most) = self.0.unwrap_or((point.coords, point.coords));
         self.0 = Some((least.inf(&point.coords), most.sup(&point.coords)));
     }
@@ -247,6 +300,8 @@ impl Bounds {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::registration::search::known_cells::KnownCells;
+    use nalgebra::UnitComplex;
     use crate::shared::geometry::{GridGeometry, UNKNOWN, pose};
     use proptest::prelude::*;
 
@@ -292,6 +347,28 @@ mod tests {
     }
 
     #[test]
+    fn what_is_outside_or_not_a_number_is_unknown() {
+        assert_eq!([0.0, 0.2, 0.999, 1.5].map(whole), [0, 0, 0, 1]);
+        for side in 0..9 {
+            // Walls up to a rim of one cell.
+            let is_inside = |along: usize| along > 0 && along + 1 < side;
+            let content = |index: usize| match is_inside(index % side) && is_inside(index / side) {
+                true => Content::Wall,
+                false => Content::Unknown,
+            };
+            let cells = (0..side * side).map(content).collect();
+            let raster = Raster { width: side, height: side, cells, ..Raster::default() };
+            let far = [-1e300, -0.1, side as f64, 1e5, 1e300, f64::INFINITY, f64::NAN];
+            for (x, y) in far.into_iter().flat_map(|far| [(far, 1.5), (1.5, far), (far, far)]) {
+                let place = Vector2::new(x, y);
+                assert_eq!(raster.content(&place), Content::Unknown, "{place}");
+                let interpolated = raster.interpolated(&[0.0, 1.0, 1.0, 1.0], &place);
+                assert!(interpolated == 0.0 || (-0.5..=side as f64 + 0.5).contains(&x.max(y)), "{place}");
+            }
+        }
+    }
+
+    #[test]
     fn a_raster_is_cropped_to_what_is_known() {
         let (geometry, cells) = map(0.0);
         let raster = Raster::new(&Grid::new(geometry, &cells).unwrap(), 0.2, 100.0).unwrap();
@@ -301,11 +378,16 @@ mod tests {
         assert_eq!(raster.at(&Point2::new(1.0, 1.0)), Content::Free);
         assert_eq!(raster.at(&Point2::new(1.0, 9.0)), Content::Unknown);
         assert!(Raster::new(&Grid::new(geometry, &cells).unwrap(), 0.2, 5.0).is_none());
-        let (least, size) = raster.box_turned(0.0);
+        let (least, size) = KnownCells::new(&raster).box_turned(0.0);
         assert!((least.x + 3.0).abs() < 0.4 && (size.y - 4.0).abs() < 0.6, "{least} {size}");
     }
 
     proptest! {
+        #[test]
+        fn the_integer_part_is_the_floor(value in 0.0..1e9) {
+            prop_assert_eq!(whole(value), value.floor() as usize);
+        }
+
         #[test]
         fn a_turned_grid_leaves_no_holes_and_wider_cells_hold_the_same(yaw in -7.0..7.0) {
             let (geometry, cells) = map(yaw);

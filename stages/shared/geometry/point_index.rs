@@ -120,6 +120,18 @@ impl PointIndex {
 
     /// The point nearest to `point`, if one is within `radius` of it. Of several at equal distance it is the first.
     pub fn nearest(&self, point: &Point2, radius: f64) -> Option<Neighbour> {
+        self.nearest_from(point, radius, usize::MAX)
+    }
+
+    /// The same, given the index of a point that may be near: the nearer it is, the fewer others are looked at. An
+    /// index of no point is ignored.
+    pub fn nearest_from(&self, point: &Point2, radius: f64, near: usize) -> Option<Neighbour> {
+        let known = self.points.get(near).map(|known| (known - point).norm_squared());
+        let known = known.filter(|squared_distance| *squared_distance <= radius * radius);
+        let mut best = known.map(|squared_distance| Neighbour { index: near, squared_distance });
+        let mut limit = known.unwrap_or(radius * radius);
+        // A little more, so that of points at equal distance the first is found.
+        let radius = known.map_or(radius, |known| radius.min(known.sqrt() * (1.0 + 1e-12)));
         let Buckets { corner, side, columns, rows } = self.buckets;
         let local = (point - corner) / side;
         let reach = radius / side;
@@ -130,13 +142,11 @@ impl PointIndex {
             && local.x - reach < column_end
             && local.y - reach < row_end;
         if self.points.is_empty() || !inside {
-            return None;
+            return best;
         }
         let clamp = |value: f64, count: usize| (value.max(0.0) as usize).min(count - 1);
         let (first_row, last_row) = (clamp(local.y - reach, rows), clamp(local.y + reach, rows));
         let home = clamp(local.y, rows);
-        let mut best: Option<Neighbour> = None;
-        let mut limit = radius * radius;
         // Row of buckets by row, from the point's own outwards: what is found first narrows what follows.
         for step in 0..=(home - first_row).max(last_row - home) {
             for row in [home.checked_sub(step), (step > 0).then_some(home + step)].into_iter().flatten() {
@@ -181,12 +191,13 @@ mod tests {
         #[test]
         fn the_nearest_point_is_that_of_a_test_of_all_points(
             points in prop::collection::vec((-5.0..5.0, -3.0..3.0), 0..200),
-            x in -7.0..7.0, y in -7.0..7.0, radius in 0.0..3.0,
+            x in -7.0..7.0, y in -7.0..7.0, radius in 0.0..3.0, near in 0usize..210,
         ) {
             let points: Vec<Point2> = points.into_iter().map(|(x, y)| Point2::new(x, y)).collect();
             let point = Point2::new(x, y);
             let (index, order) = PointIndex::new(&points, SIDE);
             let found = index.nearest(&point, radius);
+            prop_assert_eq!(index.nearest_from(&point, radius, near), found);
             prop_assert_eq!(found.map(|found| found.squared_distance), by_looking_at_all(&points, &point, radius));
             if let Some(found) = found {
                 prop_assert_eq!(index.points()[found.index], points[order[found.index]]);
