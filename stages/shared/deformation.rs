@@ -19,6 +19,8 @@ pub type Corners = [(usize, f64); 4];
 
 /// Largest distance of a node from the origin along x or y, in vertices: maps in UTM coordinates are 10,000 km from it.
 const MOST_VERTICES: f64 = 1e9;
+/// Cells of a row that are looked at one by one only where not all of them are in one square.
+const CELLS_AT_ONCE: usize = 16;
 /// Largest number of nodes of a lattice, as their equations are solved together.
 const MOST_NODES: usize = 10_000;
 /// Largest number of its vertices, including those without a node.
@@ -133,16 +135,27 @@ impl Lattice {
 /// Corners of the squares of the side `spacing` in which the grid has a known cell, row by row.
 fn vertices_over(grid: &Grid<'_>, spacing: f64) -> Vec<Vertex> {
     let geometry = &grid.geometry;
-    let width = geometry.width.max(1);
     let mut vertices = BTreeMap::new();
     let mut last = None;
-    for (index, _) in grid.cells.iter().enumerate().filter(|(_, cell)| is_known(**cell)) {
-        let cell = Cell { column: index % width, row: index / width };
-        let Some(square) = vertex_below(&geometry.centre(cell), spacing) else { continue };
-        if last.replace(square) != Some(square) {
-            let (column, row) = square;
-            for corner in [(column, row), (column + 1, row), (column, row + 1), (column + 1, row + 1)] {
-                vertices.insert((corner.1, corner.0), corner);
+    for (row, cells) in grid.cells.chunks(geometry.width.max(1)).enumerate() {
+        let square_of = |column: usize| vertex_below(&geometry.centre(Cell { column, row }), spacing);
+        for (number, part) in cells.chunks(CELLS_AT_ONCE).enumerate() {
+            let known = |cell: &i8| is_known(*cell);
+            let (Some(first), Some(behind)) = (part.iter().position(known), part.iter().rposition(known)) else {
+                continue;
+            };
+            let start = number * CELLS_AT_ONCE;
+            // Between two cells in one square all are in it.
+            let is_one_square = square_of(start + first) == square_of(start + behind);
+            let end = if is_one_square { first } else { behind };
+            for column in (first..=end).filter(|column| is_known(part[*column])) {
+                let Some(square) = square_of(start + column) else { continue };
+                if last.replace(square) != Some(square) {
+                    let (column, row) = square;
+                    for corner in [(column, row), (column + 1, row), (column, row + 1), (column + 1, row + 1)] {
+                        vertices.insert((corner.1, corner.0), corner);
+                    }
+                }
             }
         }
     }
@@ -151,9 +164,11 @@ fn vertices_over(grid: &Grid<'_>, spacing: f64) -> Vec<Vertex> {
 
 /// The vertex at the lower left of the square of a point; none if it is beyond all lattices.
 fn vertex_below(point: &Point2, spacing: f64) -> Option<Vertex> {
-    let (column, row) = ((point.x / spacing).floor(), (point.y / spacing).floor());
+    let (column, row) = (point.x / spacing, point.y / spacing);
     let fits = column.abs() < MOST_VERTICES && row.abs() < MOST_VERTICES;
-    fits.then_some((column as i32, row as i32))
+    // A cast rounds towards zero, in a fraction of the time of `floor`.
+    let floor = |value: f64| value as i32 - i32::from(value < f64::from(value as i32));
+    fits.then(|| (floor(column), floor(row)))
 }
 
 /// Deformation of a map: a displacement field in its own frame.

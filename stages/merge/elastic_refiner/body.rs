@@ -4,24 +4,32 @@ use crate::shared::deformation::{Corners, Lattice};
 use crate::shared::geometry::{Grid, Point2, Pose2, is_free};
 use crate::shared::walls::{LEAST_NORMAL_AGREEMENT, WallMap, before_wall};
 use nalgebra::Vector2;
+use std::sync::Arc;
 
 /// A map that is placed in the world.
 #[derive(Clone, Debug)]
 pub struct Body<'a> {
     /// Walls of the map.
     pub(super) walls: &'a WallMap,
+    /// What does not depend on the place, shared by all copies.
+    pub(super) shape: Arc<Shape>,
+    /// `T_world_map`.
+    pub(super) transform_world_map: Pose2,
+    /// Whether it is not deformed.
+    pub(super) is_kept: bool,
+}
+
+/// The walls of a map with the nodes around them, in its own frame.
+#[derive(Debug)]
+pub(super) struct Shape {
     /// Sides from which each point of the walls is seen.
     pub(super) seen: Vec<Sides>,
     /// Nodes of the deformation.
     pub(super) lattice: Lattice,
     /// For each point of the walls, the nodes around it.
     pub(super) corners: Vec<Option<Corners>>,
-    /// Lower and upper corner of the bounding box of the walls, map frame; none without walls.
+    /// Lower and upper corner of the bounding box of the walls; none without walls.
     pub(super) bounds: Option<[Point2; 2]>,
-    /// `T_world_map`.
-    pub(super) transform_world_map: Pose2,
-    /// Whether it is not deformed.
-    pub(super) is_kept: bool,
 }
 
 /// Sides from which a wall is seen: that of its normal, and the opposite one.
@@ -46,7 +54,14 @@ impl<'a> Body<'a> {
         let corners = walls.walls.points().iter().map(|point| lattice.corners(point)).collect();
         let grow = |[low, high]: [Point2; 2], point: &Point2| [low.inf(point), high.sup(point)];
         let bounds = walls.walls.points().first().map(|first| walls.walls.points().iter().fold([*first; 2], grow));
-        Self { walls, seen, lattice, corners, bounds, transform_world_map, is_kept: false }
+        let shape = Arc::new(Shape { seen, lattice, corners, bounds });
+        Self { walls, shape, transform_world_map, is_kept: false }
+    }
+
+    /// The same map at another pose.
+    #[must_use]
+    pub fn at(&self, transform_world_map: Pose2) -> Self {
+        Self { transform_world_map, ..self.clone() }
     }
 
     /// The same map without deformation, while others are aligned with it.

@@ -44,7 +44,7 @@ pub(super) struct DeformedBody<'a> {
 impl DeformedBody<'_> {
     /// Position of a point of the walls, world, and the nodes around it.
     fn in_world(&self, index: usize) -> Option<(Point2, Corners)> {
-        let corners = self.body.corners[index]?;
+        let corners = self.body.shape.corners[index]?;
         let point = self.body.walls.walls.points()[index];
         Some((self.body.transform_world_map * self.deformation.apply_at(&point, &corners), corners))
     }
@@ -53,7 +53,7 @@ impl DeformedBody<'_> {
     /// deformed to, map frame.
     fn bounds(&self, reach: f64) -> Option<[Point2; 2]> {
         let margin = Vector2::repeat(reach + self.deformation.largest_move());
-        self.body.bounds.map(|[low, high]| [low - margin, high + margin])
+        self.body.shape.bounds.map(|[low, high]| [low - margin, high + margin])
     }
 }
 
@@ -157,7 +157,7 @@ fn find(
     let partner = a.body.walls.walls.nearest(&a.deformation.inverse(&in_a), reach)?.index;
     let normal = of_a_world * a.body.walls.normals[partner];
     let cosine = normal.dot(&(of_b_world * b.body.walls.normals[index]));
-    if !a.body.seen[partner].fit(b.body.seen[index], cosine) {
+    if !a.body.shape.seen[partner].fit(b.body.shape.seen[index], cosine) {
         return None;
     }
     let place = a.body.walls.walls.points()[partner];
@@ -188,7 +188,7 @@ impl Contact {
         for (end, (deformed, corners, point, sign)) in ends.into_iter().enumerate() {
             let normal = deformed.body.transform_world_map.inverse_transform_vector(&self.normal).transpose();
             for (place, &(node, weight)) in corners.iter().enumerate() {
-                let arm = point - deformed.body.lattice.position(node);
+                let arm = point - deformed.body.shape.lattice.position(node);
                 let by_node: RowVector3<f64> = normal * node_jacobian(&arm);
                 row.fixed_rows_mut::<3>(12 * end + 3 * place).copy_from(&(sign * weight * by_node).transpose());
             }

@@ -37,14 +37,14 @@ impl Equations {
         for body in bodies {
             let (shift, turn) = if body.is_kept { KEPT_DEVIATION } else { FRAME_DEVIATION };
             let of_frame = Vector3::new(shift, shift, turn).map(|deviation| deviation.powi(-2));
-            for node in first..first + body.lattice.len() {
+            for node in first..first + body.shape.lattice.len() {
                 equations.add(node, node, || Matrix3::from_diagonal(&of_frame));
             }
-            for (i, j) in body.lattice.edges() {
-                let (at_i, at_j) = (body.lattice.position(i), body.lattice.position(j));
+            for (i, j) in body.shape.lattice.edges() {
+                let (at_i, at_j) = (body.shape.lattice.position(i), body.shape.lattice.position(j));
                 equations.add_edge((first + i, at_i), (first + j, at_j), parameters);
             }
-            first += body.lattice.len();
+            first += body.shape.lattice.len();
         }
         equations
     }

@@ -62,7 +62,7 @@ impl RefinedMap {
 /// because numbers are too large.
 pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Option<Refinement> {
     let mut deformations: Vec<Deformation> =
-        bodies.iter().map(|body| Deformation::none(body.lattice.clone())).collect();
+        bodies.iter().map(|body| Deformation::none(body.shape.lattice.clone())).collect();
     let boxes: Vec<Option<[Point2; 2]>> = bodies.iter().map(|body| known_box(body, parameters.reach)).collect();
     let is_below = |low: &Point2, high: &Point2| low.x <= high.x && low.y <= high.y;
     let meet = |a: usize, b: usize| {
@@ -71,7 +71,7 @@ pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Opt
     let pairs: Vec<(usize, usize)> =
         (0..bodies.len()).flat_map(|a| (0..bodies.len()).map(move |b| (a, b))).filter(|&(a, b)| meet(a, b)).collect();
     let firsts: Vec<usize> =
-        bodies.iter().scan(0, |next, body| Some(std::mem::replace(next, *next + body.lattice.len()))).collect();
+        bodies.iter().scan(0, |next, body| Some(std::mem::replace(next, *next + body.shape.lattice.len()))).collect();
     let find = |deformations: &[Deformation], share: f64| -> Vec<Contacts> {
         let deformed =
             |body: usize| DeformedBody { body: &bodies[body], deformation: &deformations[body], first: firsts[body] };
@@ -123,12 +123,12 @@ fn known_box(body: &Body<'_>, reach: f64) -> Option<[Point2; 2]> {
 
 /// Elimination order of the nodes of all bodies.
 fn order(bodies: &[Body<'_>], firsts: &[usize], walls: &[Contacts]) -> Dissection {
-    let in_world = |body: &Body<'_>, node: usize| body.transform_world_map * body.lattice.position(node);
+    let in_world = |body: &Body<'_>, node: usize| body.transform_world_map * body.shape.lattice.position(node);
     let at: Vec<Point2> =
-        bodies.iter().flat_map(|body| (0..body.lattice.len()).map(|node| in_world(body, node))).collect();
+        bodies.iter().flat_map(|body| (0..body.shape.lattice.len()).map(|node| in_world(body, node))).collect();
     let mut neighbours = vec![Vec::new(); at.len()];
     for (body, first) in bodies.iter().zip(firsts) {
-        for (i, j) in body.lattice.edges() {
+        for (i, j) in body.shape.lattice.edges() {
             neighbours[first + i].push(first + j);
             neighbours[first + j].push(first + i);
         }

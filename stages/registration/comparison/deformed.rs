@@ -31,23 +31,21 @@ pub struct Deformed {
 
 impl Deformed {
     /// Deforms map b onto map a, from an initial relative pose. `None` if the equations have no solution, or if the
-    /// maps then have nothing in common.
+    /// maps then have nothing in common. The [`bodies`](Self::bodies) of the maps serve for all poses.
     pub fn new(
         a: &MapView<'_>,
         b: &MapView<'_>,
+        [body_a, body_b]: &[Body<'_>; 2],
         transform_a_b: &Pose2,
         parameters: &ComparisonParameters,
     ) -> Option<Self> {
-        // Map a is fixed, so map b takes the deformation of both.
         let elastic = ElasticRefinerParameters {
             bend: SQRT_2 * parameters.bend,
             turn: SQRT_2 * parameters.turn,
             ..Default::default()
         };
-        let bodies = [
-            Body::new(&a.grid, a.walls, Pose2::identity(), elastic.spacing).kept(),
-            Body::new(&b.grid, b.walls, *transform_a_b, elastic.spacing),
-        ];
+        // Map a is fixed, so map b takes the deformation of both.
+        let bodies = [body_a.clone().kept(), body_b.at(*transform_a_b)];
         let refined = refine(&bodies, &elastic)?.maps.pop()?;
         let walls = b.walls.deformed(&refined.deformation);
         let deformed = MapView { grid: b.grid, walls: &walls, deformation: Some(&refined.deformation) };
@@ -59,6 +57,12 @@ impl Deformed {
             cost: refined.cost,
             agreement: compare(a, &deformed, transform_a_b, parameters),
         })
+    }
+
+    /// Two maps, each in its own frame, as they are deformed.
+    pub fn bodies<'a>(a: &MapView<'a>, b: &MapView<'a>) -> [Body<'a>; 2] {
+        let spacing = ElasticRefinerParameters::default().spacing;
+        [a, b].map(|map| Body::new(&map.grid, map.walls, Pose2::identity(), spacing))
     }
 }
 

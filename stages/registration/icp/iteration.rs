@@ -19,7 +19,7 @@ pub(super) struct Iteration<'a> {
     a: &'a WallMap,
     b: &'a WallMap,
     first_guess: &'a FirstGuess,
-    parameters: &'a IcpParameters,
+    pub(super) parameters: &'a IcpParameters,
     measurements: Vec<Measurement>,
     /// For each point of b, the wall of a that was nearest when it was last paired.
     partners: Vec<u32>,

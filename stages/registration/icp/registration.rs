@@ -64,22 +64,13 @@ pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: 
     }
     let (mut transform_a_b, mut errors) =
         best.map_or((first_guess.transform_a_b, Vec::new()), |(_, transform, errors)| (transform, errors));
-    let (mut converged, mut motions) = (false, Vec::new());
-    for _ in 0..parameters.max_iterations {
-        let Some(change) = iteration.run(&transform_a_b, parameters.min_distance, 1) else { break };
-        transform_a_b = change.transform_a_b;
-        errors.push(iteration.error());
-        motions.push(change.motion);
-        converged = change.motion.norm() < parameters.convergence;
-        if converged || is_cycle(&motions) {
-            break;
-        }
-    }
+    let last_motion = settle(&mut iteration, &mut transform_a_b, &mut errors);
+    let converged = last_motion.is_some_and(|motion| motion < parameters.convergence);
     iteration.measure_by_lines(&transform_a_b);
     let state = iteration.into_state();
     let frame = state.frame;
     // If the iterations oscillate between partners, the uncertainty is at least the amplitude.
-    let unsettled = if converged { 0.0 } else { motions.last().map_or(0.0, Vector3::norm_squared) };
+    let unsettled = if converged { 0.0 } else { last_motion.map_or(0.0, |motion| motion.powi(2)) };
     let covariance = state.covariance + Matrix3::from_diagonal_element(unsettled);
     let (jacobian, inverse) = (frame.jacobian(&transform_a_b), frame.inverse_jacobian(&transform_a_b));
     let metres_to_radians = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1.0 / frame.scale));
@@ -97,6 +88,23 @@ pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: 
         radius: frame.scale,
         step: first_guess.distance(&transform_a_b, &frame, parameters),
     }
+}
+
+/// Iterates on all points at the least distance until they hardly move, or come back to where they were. Returns how far
+/// they moved last, root mean square, metres.
+fn settle(iteration: &mut Iteration<'_>, transform_a_b: &mut Pose2, errors: &mut Vec<f64>) -> Option<f64> {
+    let parameters = iteration.parameters;
+    let mut motions = Vec::new();
+    for _ in 0..parameters.max_iterations {
+        let Some(change) = iteration.run(transform_a_b, parameters.min_distance, 1) else { break };
+        *transform_a_b = change.transform_a_b;
+        errors.push(iteration.error());
+        motions.push(change.motion);
+        if change.motion.norm() < parameters.convergence || is_cycle(&motions) {
+            break;
+        }
+    }
+    motions.last().map(Vector3::norm)
 }
 
 /// Whether the last motions lead back to a pose before them, as where points alternate between partners.

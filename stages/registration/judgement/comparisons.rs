@@ -6,6 +6,7 @@ use crate::registration::comparison::{Agreement, ComparisonParameters, Deformed,
 use crate::shared::geometry::Pose2;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::OnceLock;
 
 /// The comparisons of two maps, by the relative pose.
 #[derive(Debug, Default)]
@@ -47,7 +48,10 @@ impl Comparisons {
         poses: &[Pose2],
         parameters: &ComparisonParameters,
     ) -> Vec<Option<Deformed>> {
-        of(&mut self.deformations, self.judgements, poses, |pose| Deformed::new(a, b, pose, parameters))
+        let bodies = OnceLock::new();
+        of(&mut self.deformations, self.judgements, poses, |pose| {
+            Deformed::new(a, b, bodies.get_or_init(|| Deformed::bodies(a, b)), pose, parameters)
+        })
     }
 }
 

@@ -28,7 +28,8 @@ use rayon::prelude::*;
 /// and less wall agrees at many poses by chance.
 const ALIKE_SHARE: f64 = 0.75;
 const ALIKE_WALL: f64 = 20.0;
-/// Share of that length and area that is enough before a pose is refined.
+/// Share of that length and area that is enough before a pose is refined. The search takes walls for common that are
+/// farther apart than inliers, and of any direction, so they are more than those.
 const BEFORE_REFINEMENT: f64 = 0.5;
 /// Bound of the log-likelihood ratio of contradictions: furniture that was moved is not in the model.
 const MOST_CONTRADICTION: f64 = 10.0;
@@ -48,10 +49,13 @@ impl SelfSimilarity {
         let aligner = MapAlignerParameters::default();
         let cell = PreparedMap::least_cell(&map.grid).max(0.5 * aligner.cell);
         let prepared = PreparedMap::new("", &map.grid, cell, aligner.max_extent);
-        let poses =
-            prepared.map_or_else(|_| Vec::new(), |prepared| self_similar_poses(&prepared, &aligner, |pose, common| {
-                may_be_alike(map, pose, common)
-            }));
+        let least_wall = BEFORE_REFINEMENT * ALIKE_WALL;
+        let is_enough = |pose: &Pose2, common: &CommonWalls| {
+            let is_much = common.length >= least_wall && common.agreement >= ALIKE_SHARE;
+            is_much && overlap(map, map, pose) >= BEFORE_REFINEMENT * ROOM
+        };
+        let poses = prepared
+            .map_or_else(|_| Vec::new(), |prepared| self_similar_poses(&prepared, &aligner, least_wall, is_enough));
         let compared = poses.par_iter().map(|pose| {
             let pose = registered(map.walls, map.walls, pose);
             (pose, compare(map, map, &pose, &parameters.comparison()))
@@ -126,13 +130,6 @@ impl Alias {
 fn is_alike(agreement: &Agreement) -> bool {
     let is_much = agreement.inlier_length >= ALIKE_WALL && agreement.overlap >= ROOM;
     is_much && agreement.inlier_ratio() >= ALIKE_SHARE
-}
-
-/// Whether a map may be similar to itself at a pose that is not refined. The search takes walls for common that are
-/// farther apart than inliers, and of any direction, so they are more than those.
-fn may_be_alike(map: &MapView<'_>, pose: &Pose2, common: &CommonWalls) -> bool {
-    let is_much = common.length >= BEFORE_REFINEMENT * ALIKE_WALL && common.agreement >= ALIKE_SHARE;
-    is_much && overlap(map, map, pose) >= BEFORE_REFINEMENT * ROOM
 }
 
 /// Logarithm of the self-similar length as a share of the inliers: self-similarity must explain all of them.

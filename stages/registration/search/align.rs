@@ -4,7 +4,8 @@ use super::peaks::{change, is_near, overlay};
 use super::prepared_map::JUDGED;
 use super::significance::{OTHERS, significance};
 use super::{
-    CommonWalls, MapAlignerParameters, Overlay, Peaks, PreparedMap, ScoredPose, SearchRefusal, covariance, refine_peak,
+    CommonWalls, Extent, MapAlignerParameters, Overlay, Peaks, PreparedMap, ScoredPose, SearchRefusal, covariance,
+    refine_peak,
 };
 use crate::registration::pose_window::PoseWindow;
 use crate::shared::geometry::{Grid, Pose2};
@@ -94,7 +95,7 @@ pub fn align_prepared(
     window: Option<&PoseWindow>,
     parameters: &MapAlignerParameters,
 ) -> Result<MapAlignments, SearchRefusal> {
-    let peaks = Peaks::find(a, b, window, parameters);
+    let peaks = Peaks::find(a, b, Extent::of(window), parameters);
     let no_fit = || if window.is_some() { SearchRefusal::NoFitInWindow } else { SearchRefusal::NoFit };
     let best = peaks.all().first().ok_or_else(no_fit)?;
     let hypotheses = hypotheses(&peaks, best.score, a, b, parameters);
@@ -114,13 +115,16 @@ pub fn align_prepared(
 }
 
 /// The best poses of a map on itself, other than the identity: `T_map_map` of poses at which the building may be
-/// self-similar, the best first. Only those are refined whose common walls are `is_enough`.
+/// self-similar, the best first. Only those with at least so much common wall are searched, metres, and only those
+/// refined whose common walls are `is_enough`.
 pub fn self_similar_poses(
     map: &PreparedMap,
     parameters: &MapAlignerParameters,
+    least_wall: f64,
     is_enough: impl Fn(&Pose2, &CommonWalls) -> bool,
 ) -> Vec<Pose2> {
-    let (peaks, here) = (Peaks::find(map, map, None, parameters), Pose2::identity());
+    let here = Pose2::identity();
+    let peaks = Peaks::find(map, map, Extent::Itself { least_wall }, parameters);
     let judged = overlay(map, map, JUDGED, parameters.free_space_penalty);
     let (Some(best), Some(itself)) = (peaks.all().first(), judged.common_walls(&here)) else { return Vec::new() };
     let is_elsewhere = |pose: &Pose2| !is_near(&here, pose, &itself.centre, parameters);

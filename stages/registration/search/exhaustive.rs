@@ -45,6 +45,12 @@ impl Rotations {
         Self { count, numbers: (0..count).collect() }
     }
 
+    /// Those from 0 to a quarter of a turn.
+    pub fn within_quarter_turn(mut self) -> Self {
+        self.numbers.retain(|number| 2 * number <= self.count);
+        self
+    }
+
     /// Of the rotations with a spacing of `step`, those nearest to the rotations of given poses, the first poses
     /// first, and `most` at most. The poses were found at rotations of `self`.
     pub fn nearest_to(&self, poses: &[ScoredPose], step: f64, most: usize) -> Self {

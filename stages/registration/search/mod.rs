@@ -41,7 +41,7 @@ pub use known_cells::KnownCells;
 pub use overlay::{CommonWalls, Overlay, Walls};
 pub use parameters::MapAlignerParameters;
 pub use peak_shape::covariance;
-pub use peaks::Peaks;
+pub use peaks::{Extent, Peaks};
 pub(crate) use peaks::{is_near, overlay};
 pub(crate) use prepared_map::JUDGED;
 pub use prepared_map::PreparedMap;

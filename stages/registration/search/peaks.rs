@@ -25,20 +25,42 @@ pub struct Peaks {
     peaks: Vec<ScoredPose>,
 }
 
+/// Which relative poses are searched.
+#[derive(Clone, Copy, Debug)]
+pub enum Extent<'a> {
+    /// All.
+    All,
+    /// Those in a window.
+    Window(&'a PoseWindow),
+    /// All of a map on itself with at least so much common wall, approximately, metres.
+    Itself {
+        /// The length.
+        least_wall: f64,
+    },
+}
+
+impl<'a> Extent<'a> {
+    /// All, or those in a window.
+    pub fn of(window: Option<&'a PoseWindow>) -> Self {
+        window.map_or(Self::All, Self::Window)
+    }
+
+    /// The window; none if there is none.
+    pub fn window(self) -> Option<&'a PoseWindow> {
+        if let Self::Window(window) = self { Some(window) } else { None }
+    }
+}
+
 impl Peaks {
-    /// Searches all poses of map b in map a, or all in a window.
-    pub fn find(
-        a: &PreparedMap,
-        b: &PreparedMap,
-        window: Option<&PoseWindow>,
-        parameters: &MapAlignerParameters,
-    ) -> Self {
+    /// Searches the poses of map b in map a, to an extent.
+    pub fn find(a: &PreparedMap, b: &PreparedMap, extent: Extent<'_>, parameters: &MapAlignerParameters) -> Self {
         let penalty = parameters.free_space_penalty;
-        let candidates: Vec<(usize, f64, (Pose2, Point2))> = search_scales(a, b, window, parameters)
+        let least_wall = if let Extent::Itself { least_wall } = extent { least_wall } else { 0.0 };
+        let candidates: Vec<(usize, f64, (Pose2, Point2))> = search_scales(a, b, extent, parameters)
             .into_iter()
             .flat_map(|Scale { level, step, poses }| {
                 let overlay = overlay(a, b, level, penalty);
-                let apart = apart_from_better(&overlay, &poses, parameters, 2.0 * step);
+                let apart = apart_from_better(&overlay, &poses, parameters, 2.0 * step, least_wall);
                 apart.into_iter().map(move |candidate| (level, step, candidate))
             })
             .collect();
@@ -57,8 +79,12 @@ impl Peaks {
             (judged(*start), judged(pose))
         });
         let (starts, mut peaks): (Vec<ScoredPose>, Vec<ScoredPose>) = ways.collect::<Vec<_>>().into_iter().unzip();
+        if matches!(extent, Extent::Itself { .. }) {
+            let inverse = |pose: &ScoredPose| ScoredPose { transform_a_b: pose.transform_a_b.inverse(), ..*pose };
+            peaks.extend(peaks.iter().map(inverse).collect::<Vec<_>>());
+        }
         let is_possible =
-            |pose: &ScoredPose| window.is_none_or(|window| window.contains(&pose.transform_a_b, 0.0, 0.0));
+            |pose: &ScoredPose| extent.window().is_none_or(|window| window.contains(&pose.transform_a_b, 0.0, 0.0));
         peaks.retain(|pose| pose.score > 0.0 && is_possible(pose));
         peaks.sort_by(ScoredPose::best_first);
         let mut visited = [starts, peaks.clone()].concat();
@@ -88,13 +114,14 @@ impl Peaks {
     }
 }
 
-/// The first of some poses within `apart` and `radians` at which most common walls are seen from the same side, each
-/// with the centroid of its common walls.
+/// The first of some poses within `apart` and `radians` at which there is at least so much common wall, metres, most of it
+/// seen from the same side, each with the centroid of its common walls.
 fn apart_from_better(
     overlay: &Overlay<'_>,
     poses: &[ScoredPose],
     parameters: &MapAlignerParameters,
     radians: f64,
+    least_wall: f64,
 ) -> Vec<(Pose2, Point2)> {
     let mut kept: Vec<(Pose2, Point2)> = Vec::new();
     for ScoredPose { transform_a_b, .. } in poses {
@@ -104,6 +131,7 @@ fn apart_from_better(
         };
         if kept.iter().all(is_apart) {
             let common = overlay.common_walls(transform_a_b);
+            let common = common.filter(|common| common.length >= least_wall);
             let common = common.filter(|common| common.faced_length >= FACED * common.length);
             kept.extend(common.map(|common| (*transform_a_b, common.centre)));
         }

@@ -301,8 +301,8 @@ impl Bounds {
 mod tests {
     use super::*;
     use crate::registration::search::known_cells::KnownCells;
-    use nalgebra::UnitComplex;
     use crate::shared::geometry::{GridGeometry, UNKNOWN, pose};
+    use nalgebra::UnitComplex;
     use proptest::prelude::*;
 
     /// A map of 6 x 4 m with a straight wall through its middle, along x, and an unknown margin.

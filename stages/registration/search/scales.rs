@@ -3,10 +3,10 @@
 //! Large maps are searched in wide cells first, which tolerate deformation, and then in narrow ones, which still
 //! resolve rooms: of a building that is much longer than its rooms, wide cells show hardly anything but walls.
 
+use super::Extent;
 use super::exhaustive::{Rotations, ScoredPose, search};
 use super::prepared_map::JUDGED;
 use super::{Content, MapAlignerParameters, PreparedMap, Raster};
-use crate::registration::pose_window::PoseWindow;
 
 /// Maps that are longer, in cells of the search, are searched in wider ones.
 const MOST_CELLS: usize = 320;
@@ -31,11 +31,11 @@ pub(super) struct Scale {
     pub(super) poses: Vec<ScoredPose>,
 }
 
-/// Searches all poses of map b in map a, or all in a window; the scales from narrow cells to wide ones.
+/// Searches the poses of map b in map a, to an extent; the scales from narrow cells to wide ones.
 pub(super) fn search_scales(
     a: &PreparedMap,
     b: &PreparedMap,
-    window: Option<&PoseWindow>,
+    extent: Extent<'_>,
     parameters: &MapAlignerParameters,
 ) -> Vec<Scale> {
     let step = 2.0 * parameters.rotation_step;
@@ -49,12 +49,16 @@ pub(super) fn search_scales(
             true => free_space_penalty.max(chance_penalty(coarse_a, coarse_b)),
             false => free_space_penalty,
         };
-        let poses = search(coarse_a, coarse_b, window, rotations, penalty, apart, MOST_POSES);
+        let poses = search(coarse_a, coarse_b, extent.window(), rotations, penalty, apart, MOST_POSES);
         Scale { level, step: rotations.step(), poses }
     };
-    let all_rotations = |level: usize| Rotations::all(step.min(close_step(level)));
+    let all_rotations = |level: usize| {
+        let all = Rotations::all(step.min(close_step(level)));
+        // The inverses of the others are within a quarter of a turn, or half a turn more.
+        if matches!(extent, Extent::Itself { .. }) { all.within_quarter_turn() } else { all }
+    };
     // A window holds few poses, so the narrowest cells find the right one.
-    if window.is_some() {
+    if extent.window().is_some() {
         return vec![search_at(narrowest, &all_rotations(narrowest))];
     }
     let is_close = |level: &usize| step <= close_step(*level);

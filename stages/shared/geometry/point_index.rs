@@ -126,23 +126,21 @@ impl PointIndex {
     /// The same, given the index of a point that may be near: the nearer it is, the fewer others are looked at. An
     /// index of no point is ignored.
     pub fn nearest_from(&self, point: &Point2, radius: f64, near: usize) -> Option<Neighbour> {
-        let known = self.points.get(near).map(|known| (known - point).norm_squared());
-        let known = known.filter(|squared_distance| *squared_distance <= radius * radius);
-        let mut best = known.map(|squared_distance| Neighbour { index: near, squared_distance });
-        let mut limit = known.unwrap_or(radius * radius);
-        // A little more, so that of points at equal distance the first is found.
-        let radius = known.map_or(radius, |known| radius.min(known.sqrt() * (1.0 + 1e-12)));
         let Buckets { corner, side, columns, rows } = self.buckets;
         let local = (point - corner) / side;
-        let reach = radius / side;
-        let (column_end, row_end) = (columns as f64, rows as f64);
+        let mut best = Best { index: usize::MAX, limit: radius * radius };
+        if let Some(known) = self.points.get(near) {
+            best.offer(near, (known - point).norm_squared());
+        }
+        // A little more, so that of points at equal distance the first is found.
+        let mut reach = (1.0 + 1e-12) * best.limit.sqrt() / side;
         // Written so that a value that is not a number fails it.
         let inside = local.x + reach >= 0.0
             && local.y + reach >= 0.0
-            && local.x - reach < column_end
-            && local.y - reach < row_end;
+            && local.x - reach < columns as f64
+            && local.y - reach < rows as f64;
         if self.points.is_empty() || !inside {
-            return best;
+            return best.found();
         }
         let clamp = |value: f64, count: usize| (value.max(0.0) as usize).min(count - 1);
         let (first_row, last_row) = (clamp(local.y - reach, rows), clamp(local.y + reach, rows));
@@ -150,28 +148,42 @@ impl PointIndex {
         // Row of buckets by row, from the point's own outwards: what is found first narrows what follows.
         for step in 0..=(home - first_row).max(last_row - home) {
             for row in [home.checked_sub(step), (step > 0).then_some(home + step)].into_iter().flatten() {
-                if row < first_row || row > last_row {
-                    continue;
-                }
                 let below = row as f64 - local.y;
-                let gap = below.max(-below - 1.0).max(0.0) * side;
-                if gap * gap > limit {
+                let gap = below.max(-below - 1.0);
+                if row < first_row || row > last_row || gap > reach {
                     continue;
                 }
-                let width = (limit - gap * gap).sqrt() / side;
-                let run = self.run(row, clamp(local.x - width, columns), clamp(local.x + width, columns));
+                let limit = best.limit;
+                let run = self.run(row, clamp(local.x - reach, columns), clamp(local.x + reach, columns));
                 for (index, candidate) in run.clone().zip(&self.points[run]) {
-                    let squared_distance = (candidate - point).norm_squared();
-                    let closer = squared_distance < limit
-                        || (squared_distance == limit && best.is_none_or(|best| index < best.index));
-                    if closer {
-                        limit = squared_distance;
-                        best = Some(Neighbour { index, squared_distance });
-                    }
+                    best.offer(index, (candidate - point).norm_squared());
+                }
+                if best.limit < limit {
+                    reach = (1.0 + 1e-12) * best.limit.sqrt() / side;
                 }
             }
         }
-        best
+        best.found()
+    }
+}
+
+/// The nearest of the points so far.
+struct Best {
+    /// Its index; beyond all if there is none.
+    index: usize,
+    /// Square of the distance to it, or of the largest one.
+    limit: f64,
+}
+
+impl Best {
+    fn offer(&mut self, index: usize, squared_distance: f64) {
+        if squared_distance < self.limit || (squared_distance == self.limit && index < self.index) {
+            *self = Self { index, limit: squared_distance };
+        }
+    }
+
+    fn found(self) -> Option<Neighbour> {
+        (self.index < usize::MAX).then_some(Neighbour { index: self.index, squared_distance: self.limit })
     }
 }
 
