@@ -21,12 +21,14 @@ pub mod map_aligner;
 pub mod merge_verifier;
 pub mod pose_window;
 mod register;
+mod scale;
 pub mod search;
 
 use gridweave_runtime::stage::StageKind;
 
 pub use hypothesis::{Basis, Hypothesis};
 pub use register::{PreparedPair, RegistrationParameters, register};
+pub use scale::Scale;
 
 /// Stage kinds of this module.
 pub fn kinds() -> Vec<StageKind> {

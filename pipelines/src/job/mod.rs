@@ -192,6 +192,22 @@ impl Job<'_> {
         self.options.accept.iter().map(|typed| read(typed).ok_or_else(|| wrong(typed))).collect()
     }
 
+    /// The resolutions that the user gives, as a parameter of the source of map files.
+    fn resolutions(&self) -> Result<toml::Table, BadUse> {
+        if !self.inputs.is_empty() && Inputs::of(self.inputs)? != Inputs::MapFiles {
+            return Err(BadUse("--resolution is for map files (YAML), and the inputs are others".to_owned()));
+        }
+        let read = |typed: &String| {
+            let (robot, side) = typed.rsplit_once('=')?;
+            let side = side.parse().ok().filter(|side: &f64| side.is_finite() && *side > 0.0)?;
+            Some((self.robot(robot), toml::Value::Float(side)))
+        };
+        let wrong = |typed: &String| {
+            BadUse(format!("`--resolution {typed}` is wrong: write ROBOT=METRES for the side of a cell, above 0"))
+        };
+        self.options.resolution.iter().map(|typed| read(typed).ok_or_else(|| wrong(typed))).collect()
+    }
+
     /// The settings of the pipeline; its log is in the bag, if there is one.
     fn overrides(&self, bag: Option<&Bag>) -> Result<Overrides> {
         let mut overrides = Overrides::default();
@@ -212,6 +228,9 @@ impl Job<'_> {
         if self.options.literal_thresholds {
             let inputs = if self.inputs.is_empty() { Inputs::MapFiles } else { Inputs::of(self.inputs)? };
             overrides.set_for_kind(inputs.source_kind(), "literal_thresholds", true);
+        }
+        if !self.options.resolution.is_empty() {
+            overrides.set_for_kind(Inputs::MapFiles.source_kind(), "resolutions", self.resolutions()?);
         }
         if self.options.results_only {
             overrides.set_for_kind(LOG_SINK, "pass_input", false);

@@ -42,6 +42,9 @@ pub(crate) struct RunOptions {
     /// Apply the thresholds of map files literally, even where these make unknown cells free or leave no walls.
     #[arg(long)]
     pub(crate) literal_thresholds: bool,
+    /// The side of a cell of a robot's map file, metres, instead of the resolution in the file.
+    #[arg(long, value_name = "ROBOT=METRES")]
+    pub(crate) resolution: Vec<String>,
     #[command(flatten)]
     pub(crate) reading: ReadingOptions,
     /// Set a parameter of a stage.

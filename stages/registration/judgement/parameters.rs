@@ -37,6 +37,11 @@ pub struct JudgementParameters {
     /// of a metre between them.
     #[schemars(range(min = 1e-6, max = 1.0))]
     pub turn: f64,
+    /// Largest error of the resolution of a map that is looked for at the end, as a share of it, where a robot is merged
+    /// with no other: the reason then names the scale at which the maps agree. 0 looks for none, as that takes as long
+    /// as many searches.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub scale_range: f64,
     /// Number of the right hypothesis in the list of a refusal, as the user has chosen it. The key is a robot, for
     /// its pair with the reference or with the only other robot, or a pair as ROBOT/ROBOT. From 1; 0 is the initial
     /// pose itself.
@@ -53,6 +58,7 @@ impl Default for JudgementParameters {
             bend: 0.1,
             max_bend: 0.5,
             turn: 0.02,
+            scale_range: 0.0,
             hypotheses: BTreeMap::new(),
         }
     }

@@ -3,10 +3,11 @@
 use super::knowledge::{Knowledge, by_initial_poses};
 use super::map_searches::MapSearches;
 use super::self_similarities::SelfSimilarities;
-use crate::registration::Hypothesis;
 use crate::registration::comparison::{Agreement, Deformed, MapView};
 use crate::registration::hypotheses::{HypothesisGatherer, Origin};
-use crate::registration::judgement::{Comparisons, JudgementParameters, Verdict, judge_again};
+use crate::registration::judgement::{Comparisons, JudgementParameters, UserKnowledge, Verdict, judge_again};
+use crate::registration::scale::{LEAST_PROBABILITY, Scale};
+use crate::registration::{Hypothesis, RegistrationParameters};
 use crate::shared::geometry::row_by_row;
 use crate::shared::robot_maps::{RobotMap, RobotMaps};
 use crate::shared::robot_pair::RobotPair;
@@ -15,6 +16,9 @@ use gridweave_runtime::ros::{Alignment, Evidence, Header, OccupancyGrid};
 use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError};
 use nalgebra::Matrix3;
 use std::collections::{BTreeMap, BTreeSet};
+
+/// The scale is searched if no more pairs are to be.
+const MOST_SCALED: usize = 6;
 
 /// Outputs of the stage.
 pub(super) struct Judgements {
@@ -123,7 +127,32 @@ impl MergeVerifier {
             let alignment = Alignment { reason, ..refused(&proposed) };
             self.send(&pair, alignment, output)?;
         }
+        self.search_scales(output)?;
         self.knowledge.unused().for_each(|unused| output.warn(unused));
+        Ok(())
+    }
+
+    /// Searches the scale between maps of robots that are merged with no other, and reports it in the reason.
+    fn search_scales(&mut self, output: &Output<Judgements>) -> Result<(), StageError> {
+        let range = self.parameters.scale_range;
+        let accepted: Vec<&RobotPair> =
+            self.sent.iter().filter(|(_, alignment)| alignment.accepted).map(|(pair, _)| pair).collect();
+        let is_alone = |robot: &str| !accepted.iter().any(|pair| pair.concerns(robot));
+        let is_improbable = |alignment: &Alignment| !alignment.accepted && alignment.score < LEAST_PROBABILITY;
+        let refused = self.sent.iter().filter(|(_, alignment)| is_improbable(alignment)).map(|(pair, _)| pair);
+        let alone: Vec<RobotPair> = refused.filter(|pair| is_alone(&pair.a) || is_alone(&pair.b)).cloned().collect();
+        if range == 0.0 || alone.len() > MOST_SCALED {
+            return Ok(());
+        }
+        let parameters = RegistrationParameters { judgement: self.parameters.clone(), ..Default::default() };
+        for pair in alone {
+            let is_known = self.knowledge.of(&pair, self.maps.iter().count()) != UserKnowledge::default();
+            let Some((a, b)) = self.maps.pair(&pair).filter(|_| !is_known) else { continue };
+            let Some(scale) = Scale::search(a.grid(), b.grid(), range, &parameters) else { continue };
+            let Some(alignment) = self.sent.get(&pair).cloned() else { continue };
+            let reason = scale_reason(&scale, &pair, b.grid().geometry.resolution) + &alignment.reason;
+            self.send(&pair, Alignment { reason, ..alignment }, output)?;
+        }
         Ok(())
     }
 
@@ -202,6 +231,20 @@ impl MergeVerifier {
         self.sent.insert(pair.clone(), alignment);
         Ok(())
     }
+}
+
+/// First paragraph of the reason for a pair whose maps agree at another scale, where the cells of map b are `cell` metres
+/// wide by its resolution.
+fn scale_reason(scale: &Scale, pair: &RobotPair, cell: f64) -> String {
+    let Scale { factor, verdict } = scale;
+    let RobotPair { a, b } = pair;
+    let Agreement { inlier_length, conflict_length, .. } = verdict.candidate.agreement;
+    format!(
+        "the maps may fit if {b} is {factor:.3} times as large: {inlier_length:.0} m of wall agree, {conflict_length:.0} m do not\n\
+         missing: the right resolution of {b}, or of {a}\n\
+         try: --resolution {b}={:.5} instead of {cell:.5}, if {a} is right\n\n",
+        factor * cell
+    )
 }
 
 /// All hypotheses of a pair, by source and rank.

@@ -67,6 +67,12 @@ impl PreparedMap {
         self.levels.iter().position(is_small).unwrap_or(LEVELS - 1)
     }
 
+    /// Half the diagonal of its bounding box, metres.
+    pub(crate) fn radius(&self) -> f64 {
+        let raster = self.level(JUDGED);
+        0.5 * raster.cell * (raster.width as f64).hypot(raster.height as f64)
+    }
+
     /// Its walls.
     pub fn walls(&self) -> &Walls {
         &self.walls

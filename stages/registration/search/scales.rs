@@ -75,11 +75,7 @@ pub(super) fn search_scales(
 /// are twice as wide in the search) by half of it. With a wider spacing the right pose could be missed between two
 /// rotations.
 fn close_step(a: &PreparedMap, b: &PreparedMap, level: usize) -> f64 {
-    let radius = |map: &PreparedMap| {
-        let raster = map.level(JUDGED);
-        0.5 * raster.cell * (raster.width as f64).hypot(raster.height as f64)
-    };
-    4.0 * a.level(level).cell / radius(a).min(radius(b))
+    4.0 * a.level(level).cell / a.radius().min(b.radius())
 }
 
 /// Penalty at which a random relative pose scores 0 in the mean. With less of a penalty, maps with little free space

@@ -10,9 +10,10 @@ pub use stage::MapFileSource;
 
 use crate::map_file::GridMap;
 use gridweave_runtime::ros::OccupancyGrid;
-use gridweave_runtime::stage::{Context, Out, OutputPorts, Outputs, Parameters, StageKind};
+use gridweave_runtime::stage::{Context, Out, OutputPorts, Outputs, ParameterError, Parameters, StageKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -28,9 +29,20 @@ pub struct MapFileSourceParameters {
     /// and where no cell reaches `occupied_thresh`, the darkest cells are occupied. Set by `--literal-thresholds` on
     /// the command line.
     pub literal_thresholds: bool,
+    /// Side of a cell of a robot's map, metres, instead of the resolution in its file. The position of the origin stays.
+    /// Set by `--resolution` on the command line.
+    pub resolutions: BTreeMap<String, f64>,
 }
 
-impl Parameters for MapFileSourceParameters {}
+impl Parameters for MapFileSourceParameters {
+    fn check_together(&self) -> Vec<ParameterError> {
+        let wrong = self.resolutions.iter().find(|(_, side)| !(side.is_finite() && **side > 0.0));
+        let error = |(robot, side): (&String, &f64)| {
+            ParameterError::new("resolutions", format!("a cell of {robot} must be wider than 0 m, not {side}"))
+        };
+        wrong.map(error).into_iter().collect()
+    }
+}
 
 /// The kind `map_file_source`.
 pub fn kind() -> StageKind {

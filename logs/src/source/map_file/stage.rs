@@ -31,7 +31,8 @@ struct NamedMap {
 
 /// Where a map comes from.
 enum Origin {
-    File(PathBuf, Thresholds),
+    /// A file, and the side of a cell, metres, if it is not that of the file.
+    File(PathBuf, Thresholds, Option<f64>),
     Memory(Arc<GridMap>),
 }
 
@@ -45,8 +46,16 @@ impl MapFileSource {
         }
         let names = robot_names(&parameters.files).map_err(|error| StageError::new(doing(), error))?;
         let thresholds = if parameters.literal_thresholds { Thresholds::Literal } else { Thresholds::ByPicture };
-        let files = parameters.files.into_iter().map(|file| Origin::File(file, thresholds));
-        Ok(Self::named(names.into_iter().zip(files), context))
+        if let Some(robot) = parameters.resolutions.keys().find(|robot| !names.contains(robot)) {
+            let help = format!("the robots are {}", names.join(", "));
+            let error = format!("`resolutions` names `{robot}`, which has no map");
+            return Err(StageError::new(doing(), error).with_help(help));
+        }
+        let files = names.into_iter().zip(parameters.files).map(|(robot, file)| {
+            let resolution = parameters.resolutions.get(&robot).copied();
+            (robot, Origin::File(file, thresholds, resolution))
+        });
+        Ok(Self::named(files, context))
     }
 
     /// A source of maps that are in memory, each with the name of its robot.
@@ -87,12 +96,13 @@ impl NamedMap {
     fn send(&self, channel_number: u32, output: &Output<FileMaps>) -> Result<(), StageError> {
         match &self.map {
             Origin::Memory(map) => self.send_map(map, channel_number, output),
-            Origin::File(file, thresholds) => {
+            Origin::File(file, thresholds, resolution) => {
                 let loaded = map_file::load_as(file, *thresholds);
-                let (map, warning) = loaded.map_err(|error| StageError::new("read a map file", error))?;
+                let (mut map, warning) = loaded.map_err(|error| StageError::new("read a map file", error))?;
                 if let Some(warning) = warning {
                     output.warn(format!("{}: {warning}", file.display()));
                 }
+                map.info.resolution = resolution.map_or(map.info.resolution, |side| side as f32);
                 self.send_map(&map, channel_number, output)
             }
         }

@@ -1,0 +1,140 @@
+//! The scale between two maps, where the resolution of one of them is wrong.
+//!
+//! A map whose resolution is some percent off fits nowhere. So maps that were refused are searched once more with the
+//! cells of map b smaller and larger, in steps so small that the ends of a building move by less than the search
+//! tolerates.
+
+use super::judgement::{UserKnowledge, Verdict};
+use super::search::{MapAlignerParameters, PreparedMap, align_prepared};
+use super::{PreparedPair, RegistrationParameters, register};
+use crate::shared::geometry::{Grid, GridGeometry};
+use rayon::prelude::*;
+
+/// Bounds of the step between the factors that are tried.
+const STEPS: (f64, f64) = (0.01, 0.05);
+/// Probability that one of the scales that are looked at closely stands out by chance.
+const BY_CHANCE: f64 = 0.05;
+/// Step at which the search for the best factor ends.
+const FINEST_STEP: f64 = 0.002;
+/// An error of the resolution below this is a deformation.
+const LEAST_ERROR: f64 = 0.01;
+/// Number of the best factors that are looked at closely.
+const LOOKED_AT: usize = 2;
+/// Least probability at which a scale is reported, which is not a merge.
+pub(super) const LEAST_PROBABILITY: f64 = 0.5;
+
+/// A scale at which two maps agree.
+#[derive(Clone, Debug)]
+pub struct Scale {
+    /// Size of map b as a share of the size that it has by its resolution.
+    pub factor: f64,
+    /// Verdict on the maps with map b at that size.
+    pub verdict: Verdict,
+}
+
+impl Scale {
+    /// Finds the scale at which two maps agree, from `1 / (1 + range)` to `1 + range`. `None` if there is no scale
+    /// other than 1 at which that is more probable than not.
+    pub fn search(a: Grid<'_>, b: Grid<'_>, range: f64, parameters: &RegistrationParameters) -> Option<Self> {
+        let rasters = Rasters::new(a, b, 1.0 + range, &parameters.search)?;
+        let step = rasters.step();
+        let most = ((1.0 + range).ln() / step).floor() as i32;
+        let factors: Vec<f64> = (-most..=most).map(|number| (f64::from(number) * step).exp()).collect();
+        let significances: Vec<f64> = factors.par_iter().map(|factor| rasters.significance(*factor)).collect();
+        // By chance a peak is as significant with probability `exp(-significance)`.
+        let least = (factors.len() as f64 / BY_CHANCE).ln();
+        let mut order: Vec<usize> = (0..factors.len()).filter(|number| significances[*number] >= least).collect();
+        // The sort is stable: of equals the smaller comes first.
+        order.sort_by(|one, other| significances[*other].total_cmp(&significances[*one]));
+        let tried = factors.len();
+        let at = |factor: f64| Self::at(a, b, factor, tried, parameters);
+        let better = |one: Self, other: Self| if other.log_odds() > one.log_odds() { other } else { one };
+        let mut best = order.iter().take(LOOKED_AT).filter_map(|number| at(factors[*number])).reduce(better)?;
+        let mut step = 0.5 * step;
+        while step > FINEST_STEP {
+            let (smaller, larger) = rayon::join(|| at(best.factor * (-step).exp()), || at(best.factor * step.exp()));
+            let last = best.factor;
+            best = [smaller, larger].into_iter().flatten().fold(best, better);
+            step = if best.factor == last { 0.5 * step } else { step };
+        }
+        (best.factor.ln().abs() > LEAST_ERROR).then_some(best)
+    }
+
+    /// Log-odds of the maps at this scale, before they are compared with those of other poses.
+    fn log_odds(&self) -> f64 {
+        self.verdict.candidate.terms().log_odds()
+    }
+
+    /// Registers the maps with map b larger by a factor. `None` if it is not more probable than not that they agree, where
+    /// one of all factors that were tried may fit by chance.
+    fn at(a: Grid<'_>, b: Grid<'_>, factor: f64, tried: usize, parameters: &RegistrationParameters) -> Option<Self> {
+        let pair = PreparedPair::new(a, scaled(b, factor), &parameters.search).ok()?;
+        let verdict = register(&pair, &UserKnowledge::default(), parameters).ok()??;
+        let odds = verdict.probability / (1.0 - verdict.probability).max(f64::EPSILON) / tried as f64;
+        let is_probable = odds / (1.0 + odds) >= LEAST_PROBABILITY;
+        (is_probable && !verdict.candidate.hypothesis.is_refused).then_some(Self { factor, verdict })
+    }
+}
+
+/// A map with cells larger by a factor.
+fn scaled(map: Grid<'_>, factor: f64) -> Grid<'_> {
+    let geometry = GridGeometry { resolution: factor * map.geometry.resolution, ..map.geometry };
+    Grid { geometry, ..map }
+}
+
+/// Two maps as they are searched at each scale.
+struct Rasters<'a> {
+    a: PreparedMap,
+    b: Grid<'a>,
+    /// Half the diagonal of the smaller map, metres.
+    radius: f64,
+    search: MapAlignerParameters,
+}
+
+impl<'a> Rasters<'a> {
+    /// For factors up to the largest. `None` if a map has no walls, or is too large.
+    fn new(a: Grid<'_>, b: Grid<'a>, largest: f64, search: &MapAlignerParameters) -> Option<Self> {
+        let search = MapAlignerParameters { max_hypotheses: 1, ..search.clone() };
+        // As wide for all scales.
+        let least = PreparedMap::least_cell(&a).max(largest * PreparedMap::least_cell(&b));
+        let search = MapAlignerParameters { cell: search.cell.max(2.0 * least), ..search };
+        let prepare = |map: &Grid<'_>| PreparedMap::new("", map, 0.5 * search.cell, search.max_extent).ok();
+        let (a, of_b) = (prepare(&a)?, prepare(&b)?);
+        let radius = a.radius().min(of_b.radius());
+        Some(Self { a, b, radius, search })
+    }
+
+    /// Step between factors of which half moves the ends of the smaller map by half a cell of the search, which are twice
+    /// as wide as those in which poses are scored.
+    fn step(&self) -> f64 {
+        (2.0 * self.search.cell / self.radius).clamp(STEPS.0, STEPS.1)
+    }
+
+    /// Peak significance of the best pose with map b larger by a factor; 0 where the maps fit nowhere.
+    fn significance(&self, factor: f64) -> f64 {
+        let b = PreparedMap::new("", &scaled(self.b, factor), 0.5 * self.search.cell, self.search.max_extent);
+        let found = b.ok().and_then(|b| align_prepared(&self.a, &b, None, &self.search).ok());
+        found.and_then(|found| found.hypotheses.first().map(|best| best.significance)).unwrap_or(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::test_world::floor_plan::{FloorPlan, drawing, seen};
+
+    #[test]
+    fn the_scale_of_a_map_with_a_wrong_resolution_is_found() {
+        let plan = FloorPlan::office();
+        let a = plan.draw(seen(-1.0, -1.0, 15.0, 13.0), drawing(3.0, 2.0, 0.4));
+        let b = plan.draw(seen(4.0, -1.0, 21.0, 13.0), drawing(12.0, 6.0, -2.1));
+        let parameters = RegistrationParameters::default();
+        let (a, b) = (a.view().grid, b.view().grid);
+        let found = Scale::search(a, scaled(b, 1.0 / 0.88), 0.2, &parameters).unwrap();
+        assert!((found.factor - 0.88).abs() < 0.005, "{}", found.factor);
+        assert!(found.verdict.candidate.agreement.inlier_length > 20.0);
+        assert!(Scale::search(a, b, 0.2, &parameters).is_none(), "the resolution is right");
+        let another = FloorPlan::another_office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
+        assert!(Scale::search(a, another.view().grid, 0.2, &parameters).is_none(), "another building");
+    }
+}
