@@ -143,6 +143,34 @@ fn maps_of_other_resolutions_and_turned_origins_are_merged() {
 }
 
 #[test]
+fn a_wrong_resolution_is_named_and_merged_only_with_the_right_one() {
+    let (folder, truth) = map_files("1001");
+    let path = folder.path().join("robot2.yaml");
+    let right = map_file::load(&path).unwrap();
+    let resolution = right.info.resolution;
+    let wrong = MapMetaData { resolution: resolution / 0.88, ..right.info };
+    map_file::save(&path, &GridMap { info: wrong, ..right }).unwrap();
+    let args = ["robot1.yaml", "robot2.yaml", "-o", "merged.yaml", "--summary", "summary.json"];
+    let refused = merge(folder.path(), &args);
+    refused.assert(3, &["the maps may fit if robot2 is 0.8"]);
+    let text = refused.stdout;
+    let proposed = text.split("--resolution robot2=").nth(1).unwrap().split(' ').next().unwrap();
+    let side: f64 = proposed.parse().unwrap();
+    assert!((side / f64::from(resolution) - 1.0).abs() < 0.01, "{side} instead of {resolution}");
+
+    let right = format!("robot2={resolution}");
+    merge(folder.path(), &[&args[..], &["--resolution", &right]].concat()).assert(0, &["merged 2 of 2 robots"]);
+    let evaluation = evaluate(folder.path(), &truth);
+    assert_eq!((&evaluation["right"], &evaluation["wrong"]), (&Value::from(1), &Value::from(0)), "{evaluation}");
+
+    for (resolution, status, problem) in
+        [("robot3=0.05", 1, "the robots are robot1, robot2"), ("robot2=0", 2, "above 0"), ("robot2", 2, "ROBOT=METRES")]
+    {
+        merge(folder.path(), &[&args[..], &["--resolution", resolution]].concat()).assert(status, &[problem]);
+    }
+}
+
+#[test]
 fn maps_of_16_million_cells_are_merged_alike_on_every_engine() {
     const SIDE: usize = 4000;
     let (folder, _) = map_files("1001");
