@@ -157,3 +157,22 @@ fn starts(
     }
     starts
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn alternating_motions_are_a_cycle_and_shrinking_ones_are_not() {
+        let motions = |ratio: f64| -> Vec<Vector3<f64>> {
+            (0..20).map(|number| 0.01 * ratio.powi(number) * Vector3::new(1.0, -0.3, 0.1)).collect()
+        };
+        assert!(is_cycle(&motions(-1.0)) && !is_cycle(&motions(-1.0)[..1]) && !is_cycle(&[]));
+        for ratio in [-0.9, -0.7, 0.5, 0.95] {
+            let shrinking = motions(ratio);
+            assert!((0..=20).all(|count| !is_cycle(&shrinking[..count])), "{ratio}");
+        }
+        let around = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]].map(|[x, y]| Vector3::new(x, y, 0.0));
+        assert!(is_cycle(&around) && !is_cycle(&around[..3]));
+    }
+}

@@ -76,3 +76,35 @@ pub fn refine_peak(overlay: &Overlay<'_>, transform_a_b: &Pose2, centre: &Point2
     let steps = Steps { metres: overlay.a.cell, radians, halvings: HALVINGS };
     coordinate_ascent(|pose| overlay.smooth_score(pose), transform_a_b, centre, steps).transform_a_b
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::geometry::pose;
+    use std::cell::RefCell;
+
+    #[test]
+    fn the_top_is_found_and_no_pose_is_scored_twice_at_one_step() {
+        let scored: RefCell<Vec<Pose2>> = RefCell::default();
+        let score = |at: &Pose2| {
+            scored.borrow_mut().push(*at);
+            let (x, y, yaw) = (at.translation.x, at.translation.y, at.rotation.angle());
+            -(x - 1.3).powi(2) - (y + 0.6).powi(2) - (yaw - 0.2).powi(2)
+        };
+        let steps = Steps { metres: 0.1, radians: 0.05, halvings: 0 };
+        let found = coordinate_ascent(score, &pose(1.0, -0.2, 0.0), &Point2::new(1.0, 0.0), steps);
+        let (x, y, yaw) = (
+            found.transform_a_b.translation.x,
+            found.transform_a_b.translation.y,
+            found.transform_a_b.rotation.angle(),
+        );
+        assert!((x - 1.3).abs() < 0.051 && (y + 0.6).abs() < 0.051 && (yaw - 0.2).abs() < 0.026, "{found:?}");
+        let scored = scored.into_inner();
+        let is_same = |one: &Pose2, other: &Pose2| {
+            let change = one.inverse() * other;
+            change.translation.vector.norm() < 1e-9 && change.rotation.angle().abs() < 1e-9
+        };
+        let again = scored.iter().enumerate().filter(|(at, one)| scored[..*at].iter().any(|two| is_same(one, two)));
+        assert_eq!(again.count(), 0);
+    }
+}
