@@ -154,7 +154,7 @@ fn a_wrong_resolution_is_named_and_merged_only_with_the_right_one() {
     let refused = merge(folder.path(), &args);
     refused.assert(3, &["the maps may fit if robot2 is 0.8"]);
     let text = refused.stdout;
-    let proposed = text.split("--resolution robot2=").nth(1).unwrap().split(' ').next().unwrap();
+    let proposed = text.split("--resolution robot2=").nth(1).unwrap().split_whitespace().next().unwrap();
     let side: f64 = proposed.parse().unwrap();
     assert!((side / f64::from(resolution) - 1.0).abs() < 0.01, "{side} instead of {resolution}");
 
