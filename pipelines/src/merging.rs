@@ -20,7 +20,7 @@ use crate::summary::RunSummary;
 use anyhow::Result;
 use gridweave_logs::map_file::GridMap;
 use gridweave_logs::source::map_file::kind_of_maps;
-use gridweave_runtime::engine::{EngineKind, Observer};
+use gridweave_runtime::engine::Observer;
 use gridweave_runtime::message::Message;
 use gridweave_runtime::pipeline::Pipeline;
 use gridweave_runtime::ros::OccupancyGrid;
@@ -116,8 +116,6 @@ impl MergeRequest {
             accept: self.accept.clone(),
             set: self.set.clone(),
             seed: self.seed,
-            // In the threads of this program, live pipelines too: another process has neither its stages nor its command line.
-            engine: Some(EngineKind::Threads),
             ..RunOptions::default()
         }
     }

@@ -121,13 +121,18 @@ impl<'a> Rasters<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shared::test_world::floor_plan::{FloorPlan, drawing, seen};
+    use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
+
+    /// Two parts of an office.
+    fn office() -> [DrawnMap; 2] {
+        let plan = FloorPlan::office();
+        let a = plan.draw(seen(-1.0, -1.0, 15.0, 13.0), drawing(3.0, 2.0, 0.4));
+        [a, plan.draw(seen(4.0, -1.0, 21.0, 13.0), drawing(12.0, 6.0, -2.1))]
+    }
 
     #[test]
     fn the_scale_of_a_map_with_a_wrong_resolution_is_found() {
-        let plan = FloorPlan::office();
-        let a = plan.draw(seen(-1.0, -1.0, 15.0, 13.0), drawing(3.0, 2.0, 0.4));
-        let b = plan.draw(seen(4.0, -1.0, 21.0, 13.0), drawing(12.0, 6.0, -2.1));
+        let [a, b] = office();
         let parameters = RegistrationParameters::default();
         let (a, b) = (a.view().grid, b.view().grid);
         let found = Scale::search(a, scaled(b, 1.0 / 0.88), 0.2, &parameters).unwrap();
@@ -136,5 +141,20 @@ mod tests {
         assert!(Scale::search(a, b, 0.2, &parameters).is_none(), "the resolution is right");
         let another = FloorPlan::another_office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
         assert!(Scale::search(a, another.view().grid, 0.2, &parameters).is_none(), "another building");
+    }
+
+    #[test]
+    fn a_map_that_is_deformed_to_another_size_puts_its_resolution_in_doubt() {
+        let [a, b] = office();
+        let parameters = RegistrationParameters::default();
+        let verdict = |factor: f64| {
+            let pair = PreparedPair::new(a.view().grid, scaled(b.view().grid, factor), &parameters.search).unwrap();
+            register(&pair, &UserKnowledge::default(), &parameters).unwrap().unwrap()
+        };
+        assert_eq!(verdict(1.0).other_scale(), None);
+        let larger = verdict(1.06);
+        let scale = larger.other_scale().unwrap();
+        assert!((scale * 1.06 - 1.0).abs() < 0.02, "{scale}");
+        assert!(larger.reason(0.98, "verifier", "a", "b").contains("which makes b 0.9"));
     }
 }

@@ -5,7 +5,7 @@ use super::ComparisonParameters;
 use super::agreement::{Agreement, MapView, compare};
 use crate::merge::elastic_refiner::{Body, ElasticRefinerParameters, refine};
 use crate::shared::deformation::Deformation;
-use crate::shared::geometry::{PointPair, Pose2, RigidFit, covariance_about, fit_rigid, is_known};
+use crate::shared::geometry::{Point2, PointPair, Pose2, RigidFit, covariance_about, fit_rigid, is_known};
 use crate::shared::walls::{WallMap, stride};
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use std::f64::consts::SQRT_2;
@@ -23,6 +23,9 @@ pub struct Deformed {
     pub covariance: Matrix3<f64>,
     /// Root mean square of the displacement of points from the rigid transform, metres.
     pub rms: f64,
+    /// Size of map b as it is deformed, as a share of its size. The deformation is estimated as small as the maps allow, so
+    /// it does not reach the whole error of a wrong resolution.
+    pub scale: f64,
     /// Cost of the deformation, see [`RefinedMap::cost`](crate::merge::elastic_refiner::RefinedMap::cost).
     pub cost: f64,
     /// Agreement of the maps with map b deformed.
@@ -49,11 +52,12 @@ impl Deformed {
         let refined = refine(&bodies, &elastic)?.maps.pop()?;
         let walls = b.walls.deformed(&refined.deformation);
         let deformed = MapView { grid: b.grid, walls: &walls, deformation: Some(&refined.deformation) };
-        let nearest = nearest_rigid(a, b.walls, transform_a_b, &refined.deformation)?;
+        let (nearest, scale) = nearest_rigid(a, b.walls, transform_a_b, &refined.deformation)?;
         Some(Self {
             transform_a_b: nearest.transform_a_b,
             covariance: nearest.covariance,
             rms: nearest.rms,
+            scale,
             cost: refined.cost,
             agreement: compare(a, &deformed, transform_a_b, parameters),
         })
@@ -66,10 +70,15 @@ impl Deformed {
     }
 }
 
-/// Fits the rigid `T_a_b` nearest to a deformation of map b, over the points that both maps know. Its covariance is
-/// what the deformation leaves: points are displaced and turned against the rigid transform. Half of either may be
+/// Fits the rigid `T_a_b` nearest to a deformation of map b, over the points that both maps know, and the size of map b
+/// under it. Its covariance is what the deformation leaves: points are displaced and turned against the rigid transform. Half of either may be
 /// the same everywhere, as far as the maps show, and then the transform is wrong by that.
-fn nearest_rigid(a: &MapView<'_>, b: &WallMap, transform_a_b: &Pose2, deformation: &Deformation) -> Option<RigidFit> {
+fn nearest_rigid(
+    a: &MapView<'_>,
+    b: &WallMap,
+    transform_a_b: &Pose2,
+    deformation: &Deformation,
+) -> Option<(RigidFit, f64)> {
     let samples = b.samples.iter().step_by(stride(b.samples.len(), MOST_PLACES));
     let places = samples.map(|sample| (sample.point, transform_a_b * deformation.apply(&sample.point)));
     let common: Vec<_> = places.filter(|(_, in_a)| is_known(a.value_at(in_a))).collect();
@@ -82,5 +91,35 @@ fn nearest_rigid(a: &MapView<'_>, b: &WallMap, transform_a_b: &Pose2, deformatio
     let of_turn = covariance_about(&fit.transform_a_b, &middle.into(), &Matrix2::zeros(), 0.5 * turned);
     // With these weights the fit's own covariance is that of points with a variance of 1 whose errors are fully
     // correlated.
-    Some(RigidFit { covariance: fit.covariance * (0.5 * fit.rms.powi(2)) + of_turn, ..fit })
+    Some((RigidFit { covariance: fit.covariance * (0.5 * fit.rms.powi(2)) + of_turn, ..fit }, scale(&pairs, &fit)))
+}
+
+/// Size of map a as a share of that of map b, by points of which the nearest rigid transform is known (Umeyama 1991,
+/// equation 42).
+fn scale(pairs: &[PointPair], fit: &RigidFit) -> f64 {
+    let weight = 1.0 / pairs.len() as f64;
+    let middle = pairs.iter().fold(Vector2::zeros(), |sum, pair| sum + weight * pair.b.coords);
+    let middle_a = fit.transform_a_b * Point2::from(middle);
+    let sums = pairs.iter().fold((0.0, f64::MIN_POSITIVE), |(along, square), pair| {
+        let arm = pair.b.coords - middle;
+        (along + (fit.transform_a_b.rotation * arm).dot(&(pair.a - middle_a)), square + arm.norm_squared())
+    });
+    sums.0 / sums.1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::geometry::pose;
+
+    #[test]
+    fn the_scale_is_that_of_the_points() {
+        let points = [(0.0, 0.0), (4.0, 0.5), (1.0, 3.0), (-2.0, 5.0)].map(|(x, y)| Point2::new(x, y));
+        for factor in [0.9, 1.0, 1.07] {
+            let moved = |b: &Point2| pose(3.0, -2.0, 0.7) * Point2::from(factor * b.coords);
+            let pairs = points.map(|b| PointPair { a: moved(&b), b, weight: 0.25 });
+            let fit = fit_rigid(&pairs).unwrap();
+            assert!((scale(&pairs, &fit) - factor).abs() < 1e-9);
+        }
+    }
 }

@@ -6,6 +6,10 @@ use crate::registration::comparison::{Agreement, Deformed};
 use crate::registration::{Basis, Hypothesis};
 use std::fmt::Write;
 
+/// Change of the size of a map from which on its resolution is in doubt: lidars and odometry are right to a percent or
+/// two.
+const RESOLUTION_ERROR: f64 = 0.03;
+
 /// The second most probable candidate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rival {
@@ -89,6 +93,12 @@ impl Verdict {
         Self { probability, refusal, ..self }
     }
 
+    /// Size of map b under the deformation, as a share of its size, where that puts the resolution of a map in doubt.
+    pub fn other_scale(&self) -> Option<f64> {
+        let scale = self.candidate.deformed.map(|deformed| deformed.scale);
+        scale.filter(|scale| (scale - 1.0).abs() > RESOLUTION_ERROR)
+    }
+
     /// The term by which the candidate is most below a usual right hypothesis.
     pub(super) fn weakest_term(&self) -> Term {
         let terms = self.candidate.terms();
@@ -113,14 +123,14 @@ impl Verdict {
         let mut text = String::new();
         // Writing to a string cannot fail.
         let _ = match &self.refusal {
-            None => self.write_acceptance(&mut text),
+            None => self.write_acceptance(robot_b, &mut text),
             Some(Refusal::RefusedUpstream(reason)) => write!(text, "{reason}"),
             Some(refusal) => self.write_refusal(refusal, accept, stage, (robot_a, robot_b), &mut text),
         };
         text
     }
 
-    fn write_acceptance(&self, text: &mut String) -> std::fmt::Result {
+    fn write_acceptance(&self, robot_b: &str, text: &mut String) -> std::fmt::Result {
         let Agreement { inlier_length, conflict_length, overlap, .. } = self.candidate.agreement;
         let agree =
             format!("{inlier_length:.0} m of wall agree and {conflict_length:.0} m contradict, in {overlap:.0} m2");
@@ -130,6 +140,9 @@ impl Verdict {
         }
         if let Some(Deformed { rms, .. }) = self.candidate.deformed {
             writeln!(text, "with a deformation of {rms:.2} m between the maps")?;
+        }
+        if let Some(scale) = self.other_scale() {
+            writeln!(text, "which makes {robot_b} {scale:.2} times as large: are the resolutions right?")?;
         }
         write!(text, "\n{}", self.candidate.hypothesis.reason)?;
         if let Some(other) = self.also_found_by() {

@@ -57,6 +57,8 @@ pub(super) struct MergeVerifier {
     /// Self-similarity of maps that were accepted without tags.
     self_similarities: SelfSimilarities,
     sent: BTreeMap<RobotPair, Alignment>,
+    /// Size of map b of accepted pairs, as a share of its size by its resolution, where that is in doubt.
+    other_scales: BTreeMap<RobotPair, f64>,
     /// Evidence that was sent last, without headers.
     evidence: BTreeMap<RobotPair, Evidence>,
 }
@@ -74,6 +76,7 @@ impl MergeVerifier {
             map_searches: MapSearches::default(),
             self_similarities: SelfSimilarities::default(),
             sent: BTreeMap::new(),
+            other_scales: BTreeMap::new(),
             evidence: BTreeMap::new(),
         }
     }
@@ -128,6 +131,11 @@ impl MergeVerifier {
             self.send(&pair, alignment, output)?;
         }
         self.search_scales(output)?;
+        for (RobotPair { a, b }, scale) in &self.other_scales {
+            output.warn(format!(
+                "{b} fits {a} if it is {scale:.2} times as large: are the resolutions of both maps right?"
+            ));
+        }
         self.knowledge.unused().for_each(|unused| output.warn(unused));
         Ok(())
     }
@@ -196,7 +204,11 @@ impl MergeVerifier {
             Some(verdict.against(alias.as_ref(), &self.parameters))
         });
         let judged_of: Vec<&Alignment> = proposed.iter().copied().filter(|one| Hypothesis::of(one).is_some()).collect();
+        self.other_scales.remove(pair);
         let Some(verdict) = &verdict else { return self.send(pair, refused(&proposed), output) };
+        if let (Some(scale), None) = (verdict.other_scale(), &verdict.refusal) {
+            self.other_scales.insert(pair.clone(), scale);
+        }
         let (evidence, alignment) = (
             evidence(verdict, pair, proposed.len()),
             judged(
