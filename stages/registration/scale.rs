@@ -10,8 +10,9 @@ use super::{PreparedPair, RegistrationParameters, register};
 use crate::shared::geometry::{Grid, GridGeometry};
 use rayon::prelude::*;
 
-/// Bounds of the step between the factors that are tried.
-const STEPS: (f64, f64) = (0.01, 0.05);
+/// Bounds of the step between the factors that are tried: with fewer the time of large maps is bounded, whose ends then move
+/// by a cell of the wider search.
+const STEPS: (f64, f64) = (0.025, 0.05);
 /// Probability that one of the scales that are looked at closely stands out by chance.
 const BY_CHANCE: f64 = 0.05;
 /// Step at which the search for the best factor ends.
@@ -47,7 +48,8 @@ impl Scale {
         // The sort is stable: of equals the smaller comes first.
         order.sort_by(|one, other| significances[*other].total_cmp(&significances[*one]));
         let tried = factors.len();
-        let at = |factor: f64| Self::at(a, b, factor, tried, parameters);
+        let is_within = |factor: f64| factor.ln().abs() <= (1.0 + range).ln();
+        let at = |factor: f64| is_within(factor).then(|| Self::at(a, b, factor, tried, parameters))?;
         let better = |one: Self, other: Self| if other.log_odds() > one.log_odds() { other } else { one };
         let mut best = order.iter().take(LOOKED_AT).filter_map(|number| at(factors[*number])).reduce(better)?;
         let mut step = 0.5 * step;
@@ -138,6 +140,8 @@ mod tests {
         let found = Scale::search(a, scaled(b, 1.0 / 0.88), 0.2, &parameters).unwrap();
         assert!((found.factor - 0.88).abs() < 0.005, "{}", found.factor);
         assert!(found.verdict.candidate.agreement.inlier_length > 20.0);
+        let beyond = Scale::search(a, scaled(b, 1.0 / 0.88), 0.05, &parameters);
+        assert!(beyond.is_none_or(|scale| scale.factor.ln().abs() <= 1.05_f64.ln()), "not beyond the range");
         assert!(Scale::search(a, b, 0.2, &parameters).is_none(), "the resolution is right");
         let another = FloorPlan::another_office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
         assert!(Scale::search(a, another.view().grid, 0.2, &parameters).is_none(), "another building");

@@ -42,12 +42,12 @@ impl Deformed {
         transform_a_b: &Pose2,
         parameters: &ComparisonParameters,
     ) -> Option<Self> {
+        // Map a is fixed, so map b takes the deformation of both.
         let elastic = ElasticRefinerParameters {
             bend: SQRT_2 * parameters.bend,
             turn: SQRT_2 * parameters.turn,
             ..Default::default()
         };
-        // Map a is fixed, so map b takes the deformation of both.
         let bodies = [body_a.clone().kept(), body_b.at(*transform_a_b)];
         let refined = refine(&bodies, &elastic)?.maps.pop()?;
         let walls = b.walls.deformed(&refined.deformation);
@@ -71,8 +71,8 @@ impl Deformed {
 }
 
 /// Fits the rigid `T_a_b` nearest to a deformation of map b, over the points that both maps know, and the size of map b
-/// under it. Its covariance is what the deformation leaves: points are displaced and turned against the rigid transform. Half of either may be
-/// the same everywhere, as far as the maps show, and then the transform is wrong by that.
+/// under it. The covariance of the transform is what the deformation leaves: points are displaced and turned against it.
+/// Half of either may be the same everywhere, as far as the maps show, and then the transform is wrong by that.
 fn nearest_rigid(
     a: &MapView<'_>,
     b: &WallMap,

@@ -19,6 +19,7 @@ mod correlation;
 mod exhaustive;
 mod fourier;
 mod known_cells;
+mod lookup;
 mod overlay;
 mod parameters;
 mod peak_shape;

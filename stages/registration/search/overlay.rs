@@ -1,6 +1,7 @@
 //! Score of one map on another at one relative pose.
 
-use super::raster::{CellTransform, Content, Raster};
+use super::lookup::CellTransform;
+use super::raster::{Content, Raster};
 use crate::shared::geometry::{Point2, Pose2};
 use nalgebra::Vector2;
 use std::f64::consts::FRAC_PI_4;
