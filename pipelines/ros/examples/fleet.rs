@@ -116,7 +116,7 @@ struct Base {
 impl Base {
     /// Merges what comes to the port `listen`, and sends the merged map to the port `to`, as the map of the robot `name`.
     fn start(folder: &Path, name: &str, listen: u16, to: u16) -> Result<Self> {
-        let text = include_str!("../bridge_base.toml");
+        let text = include_str!("../../bridge/bridge_base.toml");
         let text = text.replace("tcp/localhost:7448", &format!("tcp/127.0.0.1:{listen}"));
         let text = text.replace("name = \"bridge_base\"", &format!("name = \"{name}\""));
         let sink = format!(
@@ -183,7 +183,7 @@ fn drive(robot: &Robot, to: u16, start: Instant, all: &Mutex<Sending>) -> Result
     };
     let context = Context { stage: "base".into(), inputs: wires.map(wire).to_vec(), ..Default::default() };
     let parameters = format!("connect = [\"tcp/127.0.0.1:{to}\"]\nsender = \"{name}\"");
-    let mut sink = StageHarness::with_context(&gridweave_ros::bridge::sink::kind(), &parameters, &context)?;
+    let mut sink = StageHarness::with_context(&gridweave_bridge::sink::kind(), &parameters, &context)?;
     let first = messages.first().map_or(0, |(_, _, time, _)| *time);
     for (wire, topic, time, bytes) in messages {
         let at = start + Duration::from_nanos(time - first);
@@ -261,7 +261,7 @@ fn measure(robots: usize, floors: usize) -> Result<String> {
     let folder = tempfile::tempdir()?;
     let last = port()?;
     let mut collector = StageHarness::new(
-        &gridweave_ros::bridge::source::kind(),
+        &gridweave_bridge::source::kind(),
         &format!("listen = [\"tcp/127.0.0.1:{last}\"]\nclock_tolerance = 1e9"),
     )?;
     let mut bases = Vec::new();

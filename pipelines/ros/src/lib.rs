@@ -6,7 +6,7 @@
 //!
 //! ```no_run
 //! fn main() -> std::process::ExitCode {
-//!     gridweave::command_with(gridweave_ros::kinds(), &[gridweave_ros::doctor()], gridweave_ros::bridge::on_log_warning)
+//!     gridweave::command_with(gridweave_ros::kinds(), &[gridweave_ros::doctor()], gridweave_bridge::on_log_warning)
 //! }
 //! ```
 //!
@@ -16,7 +16,6 @@
 #![forbid(unsafe_code)]
 
 pub mod attachment;
-pub mod bridge;
 mod changed_part;
 mod connection;
 mod dds_graph;
@@ -45,8 +44,8 @@ mod zenoh_node;
 pub use doctor::doctor;
 use gridweave_runtime::stage::StageKind;
 
-/// The stage kinds of this crate.
+/// The stage kinds for ROS 2 and of the bridge between machines.
 pub fn kinds() -> Vec<StageKind> {
     let ros = [source::kind(), sink::kind()];
-    ros.into_iter().chain(bridge::kinds()).collect()
+    ros.into_iter().chain(gridweave_bridge::kinds()).collect()
 }

@@ -12,19 +12,12 @@ use super::zenoh_node::{ZenohNode, ZenohPublisher, ZenohSubscriber};
 use gridweave_runtime::stage::StageError;
 use std::borrow::Cow;
 use std::sync::Arc;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 /// A node.
 pub(crate) struct Node {
     domain: u32,
     dds: Option<DdsNode>,
     zenoh: Option<ZenohNode>,
-}
-
-/// The system clock, nanoseconds since the Unix epoch. It is only read where messages come from or go to other programs.
-pub(crate) fn nanoseconds_now() -> i64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }
 
 /// A message as it was received.

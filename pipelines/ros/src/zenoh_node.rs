@@ -1,11 +1,12 @@
 //! A ROS 2 node over Zenoh, with its publishers and subscribers.
 
 use super::attachment::Attachment;
-use super::connection::{Connection, in_words, is_connected};
+use super::connection::Connection;
 use super::key_expression::Topic;
 use super::liveliness::{Entity, Kind};
-use super::node::nanoseconds_now;
 use super::qos::Qos;
+use gridweave_bridge::clock::nanoseconds_now;
+use gridweave_bridge::zenoh_session::{in_words, is_connected};
 use gridweave_runtime::stage::StageError;
 use std::time::Duration;
 use zenoh::liveliness::LivelinessToken;

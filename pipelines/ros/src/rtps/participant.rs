@@ -8,13 +8,14 @@ use super::network::{Network, Reach};
 use super::outgoing::{Content, Outgoing};
 use super::reader::Sample;
 use super::state::{Event, Mismatch, Role, State};
+use gridweave_bridge::clock::nanoseconds_now;
 use std::collections::BTreeMap;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddrV4};
 use std::sync::atomic::{AtomicBool, AtomicU16, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 /// Periods of the announcements of a participant: afterwards, and for the first ones; and the number of those.
 const ANNOUNCEMENT: Duration = Duration::from_secs(3);
@@ -68,12 +69,6 @@ struct Shared {
 
 fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
     of.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// The system clock, nanoseconds since the Unix epoch.
-pub(super) fn nanoseconds_now() -> i64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }
 
 /// An identifier that no other participant has: of the vendor, the process, the time and the number within the process.

@@ -136,7 +136,7 @@ impl State {
 
     fn announce(&mut self, is_writer: bool, sample: [Vec<u8>; 2], is_key: bool, now: Instant) -> i64 {
         let Some(writer) = self.writers.get_mut(&announcer(is_writer)) else { return 0 };
-        let (sequence, outgoing) = writer.write(super::participant::nanoseconds_now(), sample, is_key, now);
+        let (sequence, outgoing) = writer.write(gridweave_bridge::clock::nanoseconds_now(), sample, is_key, now);
         self.outgoing.extend(outgoing);
         sequence
     }

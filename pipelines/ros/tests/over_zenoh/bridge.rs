@@ -18,7 +18,7 @@ pub(crate) fn free_endpoint() -> (String, u16) {
 
 pub(crate) fn source(endpoint: &str, more: &str) -> StageHarness {
     let parameters = format!("listen = [\"{endpoint}\"]\n{more}");
-    StageHarness::new(&gridweave_ros::bridge::source::kind(), &parameters).unwrap()
+    StageHarness::new(&gridweave_bridge::source::kind(), &parameters).unwrap()
 }
 
 pub(crate) fn sink(endpoint: &str, more: &str) -> StageHarness {
@@ -33,7 +33,7 @@ pub(crate) fn sink(endpoint: &str, more: &str) -> StageHarness {
         [("map", OccupancyGrid::NAME), ("pose", PoseWithCovarianceStamped::NAME), ("conflicts", OccupancyGrid::NAME)];
     let context = Context { stage: "base".into(), inputs: wires.map(wire).to_vec(), ..Default::default() };
     let parameters = format!("connect = [\"{endpoint}\"]\n{more}");
-    StageHarness::with_context(&gridweave_ros::bridge::sink::kind(), &parameters, &context).unwrap()
+    StageHarness::with_context(&gridweave_bridge::sink::kind(), &parameters, &context).unwrap()
 }
 
 pub(crate) fn map(frame: &str, time: u64, size: usize) -> Vec<u8> {
@@ -291,8 +291,8 @@ fn two_senders_of_one_name_and_a_base_that_is_not_there_are_told() {
 #[test]
 fn what_is_open_to_others_must_be_told_to_be() {
     for (kind, parameters) in [
-        (gridweave_ros::bridge::source::kind(), "listen = [\"tcp/0.0.0.0:0\"]"),
-        (gridweave_ros::bridge::sink::kind(), "connect = [\"tcp/10.0.0.1:7448\"]"),
+        (gridweave_bridge::source::kind(), "listen = [\"tcp/0.0.0.0:0\"]"),
+        (gridweave_bridge::sink::kind(), "connect = [\"tcp/10.0.0.1:7448\"]"),
     ] {
         let error = StageHarness::new(&kind, parameters).err().unwrap().to_string();
         assert!(error.contains("not encrypted") && error.contains("insecure = true"), "{error}");

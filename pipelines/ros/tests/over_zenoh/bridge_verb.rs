@@ -219,7 +219,7 @@ pub(crate) fn log_base(robot: &Robot, base: &str, endpoint: &str, log: &str) -> 
 fn a_run_that_is_carried_to_a_base_ends_in_the_same_map_as_where_it_was() {
     let mut robot = Robot::start();
     let endpoint = free_endpoint();
-    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("bridge_base.toml");
+    let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("../bridge/bridge_base.toml");
     let listen = format!("robots.listen=[\"{endpoint}\"]");
     let args = ["run", pipeline.to_str().unwrap(), "--output", "base.mcap", "--summary", "summary.json"];
     let args = [&args[..], &["--set", &listen, "--set", "robots.end_after=1"]].concat();
@@ -299,7 +299,7 @@ fn top_at_the_base_shows_the_stages_of_the_robot_with_its_name() {
     let endpoint = free_endpoint();
     let (name, mut base) =
         log_base(&robot, &BASE.replace("robots.tags\"", "robots.tags\", \"robots.stages\""), &endpoint, "base.mcap");
-    let mut bridge = robot.bridge(&endpoint, &["--set", "tell_stages=0.1"]);
+    let mut bridge = robot.bridge(&endpoint, &["--set", "report_stages=0.1"]);
     (0..3).for_each(|part| robot.play(part));
     let sent = robot.sent;
     let top = |more: &[&str]| {

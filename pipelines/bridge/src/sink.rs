@@ -59,7 +59,7 @@ pub struct SinkParameters {
     pub interval: f64,
     /// The period at which the progress of the stages is reported to the other end, for its `top`, seconds; 0 for never.
     #[schemars(range(min = 0.0, max = 3600.0))]
-    pub tell_stages: f64,
+    pub report_stages: f64,
     /// Allow the other end to tap the links of this run, including those that are not sent, with `tap` on the base.
     pub allow_tap: bool,
     /// The maximum time that the end of the run waits for the other end to acknowledge the last messages, seconds.
@@ -84,7 +84,7 @@ impl Default for SinkParameters {
             keep_last: 6000,
             keep_maps: 100,
             interval: 0.05,
-            tell_stages: 2.0,
+            report_stages: 2.0,
             allow_tap: true,
             linger: 30.0,
         }
@@ -176,7 +176,8 @@ impl BridgeSink {
         };
         let links: Vec<Link> = context.inputs.iter().map(link).collect();
         let settings = parameters.settings(clock, context);
-        let interval = Duration::try_from_secs_f64(parameters.tell_stages).ok().filter(|interval| !interval.is_zero());
+        let interval =
+            Duration::try_from_secs_f64(parameters.report_stages).ok().filter(|interval| !interval.is_zero());
         let told = context.statistics.clone().zip(interval);
         let report = told.map(|(statistics, interval)| Report::new(&settings.name, statistics, interval));
         Ok(Self {

@@ -1,6 +1,12 @@
 //! The clocks of two machines.
 
-use crate::node::nanoseconds_now;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+/// The system clock, nanoseconds since the Unix epoch. It is only read where messages come from or go to other programs.
+pub fn nanoseconds_now() -> i64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
+}
 
 /// The clock of a machine.
 #[derive(Clone, Copy, Debug, Default)]

@@ -3,8 +3,8 @@
 use super::super::network::Network;
 use super::super::presence::{Presence, Role, watch};
 use super::super::wire::{from_bytes, to_bytes};
+use super::super::zenoh_session::{in_words, is_connected};
 use super::requests::{Answer, Link, Passed, Request, State};
-use crate::connection::{in_words, is_connected};
 use gridweave_runtime::pipeline::{named_link, suggest};
 use gridweave_runtime::stage::StageError;
 use std::collections::BTreeSet;

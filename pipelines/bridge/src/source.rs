@@ -10,7 +10,7 @@ use super::network::{BASE, Network, is_part_of_key};
 use super::presence::{Presence, Role, watch};
 use super::report;
 use super::wire::{Link, to_bytes};
-use crate::connection::in_words;
+use super::zenoh_session::in_words;
 use gridweave_logs::schemas::schema_text;
 use gridweave_logs::source::live_kind;
 use gridweave_runtime::message::{Channel, MessageHeader};

@@ -2,10 +2,10 @@
 
 use super::super::presence::{Presence, Role, watch};
 use super::super::wire::{from_bytes, to_bytes};
+use super::super::zenoh_session::in_words;
 use super::message_queue::Limits;
 use super::requests::{Answer, Request, State};
 use super::sessions::TapSessions;
-use crate::connection::in_words;
 use gridweave_runtime::stage::{RunLinks, StageError};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{self, JoinHandle};

@@ -3,7 +3,7 @@
 //! The key of a token is `gridweave/bridge/BRIDGE/ROLE/NAME/NUMBER`. Zenoh withdraws it when the program ends, and when the
 //! connection was silent for ten seconds.
 
-use crate::connection::in_words;
+use super::zenoh_session::in_words;
 use gridweave_runtime::stage::StageError;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::sample::{Sample, SampleKind};

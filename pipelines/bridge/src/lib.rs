@@ -27,10 +27,12 @@
 //! 7. **Taps.** A sender provides links of its run to programs that request them, whether it transports them or not:
 //!    `tap/mod.rs`. An end without support for taps does not answer the requests.
 
+#![forbid(unsafe_code)]
+
 mod absent_senders;
 mod certificates;
 mod channel_numbers;
-mod clock;
+pub mod clock;
 mod connection_errors;
 mod difference;
 mod ingest;
@@ -45,6 +47,7 @@ mod tap;
 #[cfg(test)]
 mod tests;
 mod wire;
+pub mod zenoh_session;
 
 pub use connection_errors::on_log_warning;
 use gridweave_runtime::stage::StageKind;

@@ -3,7 +3,7 @@
 //! Zenoh retries connections without reporting the reason. The connecting end finds it with [`connection_error`]; the listening
 //! end from Zenoh's log, whose warnings a program passes to [`on_log_warning`].
 
-use crate::connection::in_words;
+use super::zenoh_session::in_words;
 use std::sync::{Mutex, PoisonError};
 use zenoh::{Config, Wait};
 

@@ -7,7 +7,7 @@ use super::presence::{Presence, Role, watch};
 use super::report::Report;
 use super::tap::Taps;
 use super::wire::{Answer, Link, from_bytes};
-use crate::connection::{in_words, is_connected};
+use super::zenoh_session::{in_words, is_connected};
 use gridweave_runtime::message::MessageHeader;
 use gridweave_runtime::stage::{RunLinks, StageError};
 use std::collections::BTreeSet;

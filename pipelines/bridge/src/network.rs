@@ -2,7 +2,7 @@
 
 use super::certificates::{Certificates, is_encrypted};
 use super::connection_errors::connection_error;
-use crate::connection::{file_config, join, peer_config};
+use super::zenoh_session::{file_config, join, peer_config};
 use gridweave_runtime::stage::{ParameterError, StageError};
 use std::net::IpAddr;
 use std::path::PathBuf;
