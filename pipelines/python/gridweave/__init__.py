@@ -3,11 +3,11 @@
     import gridweave
 
     result = gridweave.merge(["a.yaml", "b.yaml"])      # map files, logs, numpy arrays, or messages
-    print(result)                                       # where each map lies, and why others could not be merged
+    print(result)                                       # the pose of each map, and why others could not be merged
     result.map.save("merged.yaml")
 
-`merge` finds how the maps lie to each other, `run` runs a pipeline, `read_log` iterates over the messages of logs, and `Stage` and
-`stage` make stages of one's own.
+`merge` estimates the relative poses of maps and merges them, `run` runs a pipeline, `read_log` iterates over the messages of logs, and
+`Stage` and `stage` make stages of one's own.
 """
 
 import importlib

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 __version__: str
 
 class GridweaveError(Exception):
-    """A run of Gridweave has failed; the text says what, and what would mend it."""
+    """A run of Gridweave has failed; the text says what, and what would fix it."""
 
 class RequestError(GridweaveError):
-    """What was asked for cannot be, such as a parameter that does not exist or a file that is no map."""
+    """The request is wrong, such as a parameter that does not exist or a file that is no map."""
 
 _Path = str | PathLike[str]
 _Origin = tuple[float, float, float]

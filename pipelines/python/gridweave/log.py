@@ -14,14 +14,15 @@ class LoggedMessage:
     """A message of a log."""
 
     topic: str
-    #: Its type, such as `nav_msgs/msg/OccupancyGrid`.
+    #: Its type, such as ``nav_msgs/msg/OccupancyGrid``.
     type: str
     #: When it was logged, nanoseconds.
     log_time: int
     #: When it was sent, nanoseconds.
     publish_time: int
-    #: Its encoding; `cdr` for the messages of ROS, also for those of ROS 1 bags.
+    #: Its encoding; ``cdr`` for the messages of ROS, also for those of ROS 1 bags.
     encoding: str
+    #: Its bytes.
     data: bytes = field(repr=False)
     _definition: str = field(repr=False)
 
@@ -40,7 +41,10 @@ def read_log(
 ) -> Iterator[LoggedMessage]:
     """Iterates over the messages of logs (MCAP, rosbag2, ROS 1 bags) in log time order; of all topics, or of some.
 
-    A damaged log is read as far as it goes, with a warning at the end. Raises `GridweaveError` if a log cannot be opened.
+    A damaged log is read as far as it goes, with a warning at the end.
+
+    Raises:
+        GridweaveError: A log cannot be opened.
     """
     paths = [logs] if isinstance(logs, (str, PathLike)) else list(logs)
     messages = _native.LogMessages(paths)

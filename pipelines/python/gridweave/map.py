@@ -13,14 +13,14 @@ from . import _native
 
 @dataclass(frozen=True, eq=False)
 class Map:
-    """An occupancy grid: what the map server of ROS has in a YAML file and an image, or a `nav_msgs/msg/OccupancyGrid`."""
+    """An occupancy grid: what the map server of ROS has in a YAML file and an image, or a ``nav_msgs/msg/OccupancyGrid``."""
 
     #: -1 unknown, 0 free to 100 occupied, as int8; rows by columns. Row 0 is at the origin, so the picture of a map file is upside
     #: down to it.
     cells: np.ndarray
     #: The side of a cell, metres.
     resolution: float
-    #: The pose of the outer corner of cell (0, 0) in the map frame: x and y (metres), yaw (radians).
+    #: The pose of the outer corner of cell (0, 0) in the map frame, as x and y (metres) and yaw (radians).
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
@@ -41,7 +41,7 @@ class Map:
 
     @classmethod
     def from_message(cls, message: Any) -> "Map":
-        """Makes a map of a `nav_msgs/msg/OccupancyGrid` of rclpy, rosbags, mcap or `gridweave.msg`: anything that has its fields."""
+        """Makes a map of a ``nav_msgs/msg/OccupancyGrid`` of rclpy, rosbags, mcap or `gridweave.msg`: anything that has its fields."""
         info = message.info
         position, q = info.origin.position, info.origin.orientation
         yaw = math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
@@ -51,7 +51,7 @@ class Map:
         return cls(cells.reshape(info.height, info.width), info.resolution, (position.x, position.y, yaw))
 
     def to_message(self, frame_id: str = "map") -> Any:
-        """The `nav_msgs/msg/OccupancyGrid` of `gridweave.msg`."""
+        """Makes a ``nav_msgs/msg/OccupancyGrid`` of `gridweave.msg`."""
         from .msg.nav_msgs import OccupancyGrid
 
         message = OccupancyGrid(data=self.cells)
@@ -68,7 +68,7 @@ class Map:
 
     @property
     def extent(self) -> tuple[float, float, float, float]:
-        """Left, right, bottom and top of the map, metres, as `matplotlib.pyplot.imshow` wants it; without the yaw of the origin."""
+        """Left, right, bottom and top of the map, metres, as ``matplotlib.pyplot.imshow`` takes it; without the yaw of the origin."""
         rows, columns = self.cells.shape
         x, y, _ = self.origin
         return x, x + columns * self.resolution, y, y + rows * self.resolution

@@ -26,21 +26,28 @@ def merge(
     output: str | PathLike[str] | None = None,
     progress: Progress = False,
 ) -> MergeResult:
-    """Finds how the maps of several robots lie to each other, and makes one map of them.
-
-    `inputs` are paths of map files (YAML of nav2's map server) or of logs (MCAP, rosbag2, ROS 1 bags), or maps: `Map`s, numpy arrays
-    (see `Map.cells`), and `nav_msgs/msg/OccupancyGrid` messages of rclpy, rosbags, mcap or `gridweave.msg`. Maps are those of
-    `robot1`, `robot2`, ... or, in a mapping, of the robots that it names; a map file is that of a robot called as the file.
-
-    `resolution` is the side of a cell of arrays, metres. `reference` is the robot whose map frame is that of the result. `initial` has
-    approximate poses (x, y, yaw) of map frames, with two more numbers their standard deviations (metres, radians); `accept` the number of
-    the hypothesis to accept that a refusal has listed for a robot, or "initial". `parameters` are those of stages, as
-    `{"elastic.enabled": False}`. `output` is a log to write. `progress` shows a bar with tqdm, or is a function that is given the share
-    that is done.
+    """Estimates the relative poses of the maps of several robots, and merges them into one map.
 
     A robot that cannot be merged is no error: `MergeResult.unmerged` says why. The same inputs give the same result on every machine.
 
-    Raises `RequestError` if what is asked for cannot be, and `GridweaveError` if the merge fails.
+    Args:
+        inputs: Paths of map files (YAML of nav2's map server) or of logs (MCAP, rosbag2, ROS 1 bags), or maps: `Map` objects, numpy
+            arrays (see `Map.cells`), and ``nav_msgs/msg/OccupancyGrid`` messages of rclpy, rosbags, mcap or `gridweave.msg`. Maps in
+            a list are those of ``robot1``, ``robot2``, ...; a mapping names their robots. A map file is the map of a robot with the
+            name of the file.
+        resolution: The side of a cell of arrays, metres.
+        reference: The robot whose map frame is the frame of the result; by default the first by name.
+        initial: Approximate poses of map frames by robot: x, y (metres), yaw (radians) and, if two more numbers follow, the standard
+            deviations of the position and of the yaw.
+        accept: For a robot, the number of the hypothesis to accept, from the list in its refusal, or ``"initial"``.
+        parameters: Parameters of stages, such as ``{"elastic.enabled": False}``.
+        seed: Seed of all random numbers.
+        output: A log to write.
+        progress: True shows a bar (tqdm); a function is called with the share that is done, 0 to 1.
+
+    Raises:
+        RequestError: The request is wrong, such as a file that is no map.
+        GridweaveError: The merge has failed.
     """
     named = inputs if isinstance(inputs, Mapping) else None
     given = list(named.values()) if named is not None else _listed(inputs)

@@ -41,7 +41,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Pair:
-    """The outcome of a pair of robots: the transform from the map of `b` to that of `a`."""
+    """The outcome of a pair of robots: the transform from the map of ``b`` to that of ``a``."""
 
     a: str
     b: str
@@ -73,7 +73,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Deformation:
-    """How a map is bent before its frame is applied, so that its walls lie on those of the other maps: a function on points."""
+    """How a map is deformed before its frame is applied, so that its walls agree with those of the other maps: a function on points."""
 
     #: The greatest displacement, metres.
     largest: float
@@ -103,7 +103,7 @@ class StageStatistics:
 
 
 class MergeResult:
-    """Where the maps of the robots lie to each other, the merged map, and the reasons."""
+    """The frames of the merged robots, the merged map, and why others could not be merged."""
 
     def __init__(self, summary: str, grid: Any, rerun: Callable[..., Any]):
         #: The summary as `gridweave merge --summary` writes it.
@@ -140,7 +140,7 @@ class MergeResult:
 
     @cached_property
     def deformations(self) -> dict[str, Deformation]:
-        """The deformation of each map that was bent."""
+        """The deformation of each map that was deformed."""
         bends = self.summary.get("bends", {})
         return {robot: Deformation(bend["largest_m"], bend["spacing"], np.array(bend["nodes"])) for robot, bend in bends.items()}
 
@@ -164,7 +164,7 @@ class MergeResult:
         return bool(self.frames) and not self.unmerged
 
     def transform(self, robot: str, points: Any) -> np.ndarray:
-        """Transforms points of a robot's map, N x 2 or one (x, y) in metres, to the merged frame: bent, and placed by its frame."""
+        """Transforms points of a robot's map, N x 2 or one (x, y) in metres, to the merged frame: deformed, and then by its frame."""
         if robot not in self.frames:
             known = ", ".join(self.frames) or "none"
             raise _native.RequestError(f"`{robot}` is not merged: {self.unmerged.get(robot, f'the merged robots are {known}')}")

@@ -25,11 +25,17 @@ def run(
 ) -> MergeResult:
     """Runs a pipeline file, or the shipped pipeline of that name, on files.
 
-    `stages` are stages of one's own, by the name that the pipeline has for their kind: classes made of `Stage`, or functions made
-    stages by `stage`. They run in this process, so a debugger stops in them, and they share what the caller has. `output` is the log that
-    the pipeline's `mcap_sink` writes; the other arguments are those of `merge`.
+    Args:
+        pipeline: The file, or the name, such as ``"map_merge"``.
+        inputs: Paths of logs or map files, as the pipeline takes them.
+        output: The log that the pipeline's ``mcap_sink`` writes.
+        stages: Stages of one's own, by the name that the pipeline has for their kind: subclasses of `Stage`, or functions decorated with
+            `stage`. They run in this process, so a debugger stops in them, and they share what the caller has.
+        reference: As for `merge`, and so are the arguments that follow.
 
-    Raises `RequestError` if the pipeline or what is asked for is wrong, and `GridweaveError` if a stage fails.
+    Raises:
+        RequestError: The pipeline or the request is wrong.
+        GridweaveError: A stage has failed.
     """
     files = [inputs] if isinstance(inputs, (str, PathLike)) else list(inputs)
     kinds = [_kind(name, made) for name, made in (stages or {}).items()]

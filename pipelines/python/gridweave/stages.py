@@ -17,7 +17,7 @@ _JSON_TYPES = {float: "number", int: "integer", str: "string", bool: "boolean"}
 
 @dataclass(frozen=True)
 class Input:
-    """An input, for messages of one type. A method `on_NAME(self, message, about)` is given each message that comes in on it."""
+    """An input, for messages of one type. A method ``on_NAME(self, message, about)`` is given each message that comes in on it."""
 
     type: type
     #: What it is for.
@@ -32,15 +32,20 @@ class Output:
     """An output, for messages of one type."""
 
     def __init__(self, type: type, summary: str = "", *, topic: str | None = None, side: bool = False):
-        """`topic` is that of its messages in a log, with `{robot}` and `{stage}` put in, where it is not
-        `/{robot}/{stage}/NAME`. A `side` output is beside what the stage is for: the name of a stage alone does not mean it.
+        """
+        Args:
+            type: The type of its messages.
+            summary: What it is for.
+            topic: The topic of its messages in a log, with ``{robot}`` and ``{stage}`` as placeholders; by default
+                ``/{robot}/{stage}/NAME``.
+            side: Whether the output is beside what the stage is for: the name of a stage alone does not mean it.
         """
         self.type, self.summary, self.topic, self.side = type, summary, topic, side
         self._send: Callable[..., None] | None = None
 
     def send(self, message: Any, robot: str = "", log_time: int | None = None) -> None:
-        """Sends a message about `robot` (empty: about none in particular). It has the log time of the message that is handled; a
-        source, which handles none, says it: nanoseconds, which never fall.
+        """Sends a message about ``robot`` (empty: about none in particular). Its log time is that of the message that is handled; a
+        source, which handles none, sets ``log_time``: nanoseconds, which never fall.
         """
         if type(message) is not self.type:
             raise TypeError(f"this output takes {ros_type(self.type)}, not {type(message).__name__}")
@@ -61,10 +66,13 @@ class Parameter:
     default: Any
     #: What it means, with its unit: metres, radians, seconds.
     summary: str = ""
-    #: The least and the greatest value; `above` and `below` are not allowed themselves.
+    #: The least value.
     minimum: float | None = None
+    #: The greatest value.
     maximum: float | None = None
+    #: Values are greater than this.
     above: float | None = None
+    #: Values are less than this.
     below: float | None = None
     #: The only values that a text may have.
     choices: tuple[str, ...] | None = None
@@ -115,18 +123,20 @@ class Context:
 
     #: The stage's name in the pipeline.
     stage: str = ""
-    #: Seeds the stage's randomness: `numpy.random.default_rng(self.context.seed)`.
+    #: Seeds the stage's randomness: ``numpy.random.default_rng(self.context.seed)``.
     seed: int = 0
     #: The robot whose map frame is the world, if the pipeline says so.
     reference: str | None = None
-    #: Topics of each robot, as in the section `[robots]`.
+    #: Topics of each robot, as in the section ``[robots]``.
     robots: dict[str, Any] | None = None
-    #: What is wired to the stage, each with `port`, `from`, `type` and `topic`.
+    #: What is wired to the stage, each with ``port``, ``from``, ``type`` and ``topic``.
     inputs: tuple[dict[str, str], ...] = ()
 
 
 class Stage:
-    """A stage: `Input`s, `Output`s and `Parameter`s as attributes of the class, and a method `on_NAME` for each input.
+    """A stage: `Input`, `Output` and `Parameter` objects as attributes of the class, and a method ``on_NAME`` for each input.
+
+    For example::
 
         class Corners(Stage):
             \"\"\"Sends the pose of each map's corner.\"\"\"
@@ -137,11 +147,11 @@ class Stage:
             def on_map(self, map, about):
                 self.corner.send(PoseStamped(map.header, map.info.origin), about.robot)
 
-    One without inputs is a source, and has a generator `messages(self)` instead: it sends with `log_time`, and yields after each
+    One without inputs is a source, and has a generator ``messages(self)`` instead: it sends with ``log_time``, and yields after each
     message or after a few that belong together.
 
-    The first line of its documentation is what `gridweave kinds` shows. `__init__` takes nothing and may use the parameters and
-    `self.context`. A stage keeps its state itself, and reads no clock: what it sends follows from what it was given, so that a replay
+    The first line of its documentation is what ``gridweave kinds`` shows. ``__init__`` takes nothing and may use the parameters and
+    ``self.context``. A stage keeps its state itself, and reads no clock: what it sends follows from what it was given, so that a replay
     gives the same output each time.
     """
 
@@ -199,8 +209,14 @@ class Stage:
     def begin(cls, parameters: dict[str, Any] | None = None, context: Context | None = None,
               send: Callable[..., None] = lambda output, message, robot, log_time=None: None,
               warn: Callable[[str], None] = lambda what: None) -> "Stage":
-        """Makes the stage as a pipeline does: with some parameters, and with what takes its messages (the name of the output,
-        the message, the robot and, of a source, the log time) and its warnings. For tests of a stage by itself."""
+        """Makes the stage as a pipeline does, for tests of a stage by itself.
+
+        Args:
+            parameters: Its parameters by their names; the others have their defaults.
+            context: Its context.
+            send: Takes its messages: the name of the output, the message, the robot and, of a source, the log time.
+            warn: Takes its warnings.
+        """
         made = cls.__new__(cls)
         known = cls._members(Parameter)
         given = parameters or {}
@@ -251,7 +267,7 @@ def stage(function: Callable[..., Any] | None = None, *, output: str = "out") ->
 
     The types of the argument and of the result are message types. A result of None sends nothing, and of a list each of its
     messages. What is sent is about the robot that the input was about. A second argument is given the `About` of the message. The
-    function itself stays as it was.
+    function itself stays as it was. ``output`` is the name of the output.
     """
     if function is None:
         return lambda function: stage(function, output=output)

@@ -1,4 +1,4 @@
-"""The message types that stages exchange, as dataclasses made from the `.msg` texts, and their encoding (CDR).
+"""The message types that stages exchange, as dataclasses made from the ``.msg`` texts, and their encoding (CDR). ::
 
     from gridweave.msg.nav_msgs import OccupancyGrid
     from gridweave.msg.gridweave_msgs import Segment, Segments
@@ -6,13 +6,13 @@
 Every field has a default: numbers are 0, texts empty, arrays of numbers are numpy arrays of the type that the text says, other
 arrays are lists, and messages in messages are such dataclasses. Constants of a text are attributes of its class.
 
-A type of one's own is made from its text, once, in a module that all stages import it from:
+A type of one's own is made from its text, once, in a module that all stages import it from::
 
     from gridweave.msg import define
 
     Room = define("my_msgs/msg/Room", "string name\\nfloat64 area")
 
-The parser and the encoding are those of the package `rosbags`.
+The parser and the encoding are those of the package ``rosbags``.
 """
 
 import dataclasses
@@ -125,10 +125,13 @@ _add(message_texts())
 
 
 def define(name: str, text: str) -> type:
-    """Makes a message type of one's own of a `.msg` text, and gives its class, which can be imported from `gridweave.msg` from then on.
+    """Makes a message type of one's own of a ``.msg`` text, and gives its class, which can be imported from `gridweave.msg` from then on.
 
-    `name` is `package/msg/Type`. The text may use all types that are known. To define a type again changes nothing; in another
-    way it is an error, as two stages would read the same bytes differently.
+    To define a type again changes nothing; in another way it is an error, as two stages would read the same bytes differently.
+
+    Args:
+        name: The name of the type, as ``package/msg/Type``.
+        text: Its text, which may use all types that are known.
     """
     if not re.fullmatch(r"[a-z][a-z0-9_]*/msg/[A-Z][A-Za-z0-9]*", name):
         raise ValueError(f"`{name}` is no name of a message type, such as my_msgs/msg/Room")
@@ -168,7 +171,7 @@ def definition(name: str) -> str | None:
 
 
 def ros_type(message_class: type) -> str:
-    """The name of a message type, such as `nav_msgs/msg/OccupancyGrid`."""
+    """The name of a message type, such as ``nav_msgs/msg/OccupancyGrid``."""
     name = getattr(message_class, "__msgtype__", None)
     if name not in _STORE.types:
         raise TypeError(f"{message_class!r} is no message type: import one from gridweave.msg")
@@ -176,18 +179,20 @@ def ros_type(message_class: type) -> str:
 
 
 def decode(message_class: type, data: memoryview) -> Any:
-    """Reads a message. Arrays of numbers are views of `data`, not copies.
+    """Reads a message. Arrays of numbers are views of ``data``, not copies.
 
-    Raises `SerdeError` if it is no such message.
+    Raises:
+        SerdeError: It is no such message.
     """
     return _STORE.deserialize_cdr(data, ros_type(message_class))
 
 
 def decode_as(name: str, text: str, data: bytes) -> Any:
-    """Reads a message of a log, whose type has the definition `text` there (`ros2msg`), with all types that it uses; without one it is
+    """Reads a message of a log, whose type has the definition ``text`` there (``ros2msg``), with all types that it uses; without one it is
     that of the same name here.
 
-    Raises `GridweaveError` if the definition or the message cannot be read.
+    Raises:
+        GridweaveError: The definition or the message cannot be read.
     """
     try:
         return _store_of(name, text).deserialize_cdr(data, name)

@@ -16,7 +16,7 @@ os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain>
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import float64, int32, sequence, uint32
+from cyclonedds.idl.types import float32, float64, int8, int32, sequence, uint32
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
@@ -68,6 +68,45 @@ class TFMessage(IdlStruct, typename="tf2_msgs::msg::dds_::TFMessage_"):
     transforms: sequence[TransformStamped] = field(default_factory=list)
 
 
+@dataclass
+class Point(IdlStruct, typename="geometry_msgs::msg::dds_::Point_"):
+    x: float64 = 0.0
+    y: float64 = 0.0
+    z: float64 = 0.0
+
+
+@dataclass
+class Pose(IdlStruct, typename="geometry_msgs::msg::dds_::Pose_"):
+    position: Point = field(default_factory=Point)
+    orientation: Quaternion = field(default_factory=Quaternion)
+
+
+@dataclass
+class MapMetaData(IdlStruct, typename="nav_msgs::msg::dds_::MapMetaData_"):
+    map_load_time: Time = field(default_factory=Time)
+    resolution: float32 = 0.0
+    width: uint32 = 0
+    height: uint32 = 0
+    origin: Pose = field(default_factory=Pose)
+
+
+@dataclass
+class OccupancyGrid(IdlStruct, typename="nav_msgs::msg::dds_::OccupancyGrid_"):
+    header: Header = field(default_factory=Header)
+    info: MapMetaData = field(default_factory=MapMetaData)
+    data: sequence[int8] = field(default_factory=list)
+
+
+@dataclass
+class OccupancyGridUpdate(IdlStruct, typename="map_msgs::msg::dds_::OccupancyGridUpdate_"):
+    header: Header = field(default_factory=Header)
+    x: int32 = 0
+    y: int32 = 0
+    width: uint32 = 0
+    height: uint32 = 0
+    data: sequence[int8] = field(default_factory=list)
+
+
 # With the encoding of ROS.
 RELIABLE = [Policy.Reliability.Reliable(duration(seconds=1)), Policy.DataRepresentation(use_cdrv0_representation=True)]
 LATCHED = Qos(*RELIABLE, Policy.Durability.TransientLocal, Policy.History.KeepLast(1))
@@ -109,4 +148,26 @@ def frames(count, longest):
     json.dump(seen, sys.stdout)
 
 
-{f.__name__: f for f in (tf, frames)}[sys.argv[1]](*sys.argv[2:])
+def updates(count, walls, longest):
+    """Keeps a map by its updates, as RViz does: says when so many have come, and ends when so many cells are walls."""
+    participant = DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
+    whole = DataReader(participant, Topic(participant, "rt/map", OccupancyGrid), qos=LATCHED)
+    parts = DataReader(participant, Topic(participant, "rt/map_updates", OccupancyGridUpdate), qos=VOLATILE)
+    cells, width, heard, end = [], 0, 0, time.monotonic() + float(longest)
+    while cells.count(100) != int(walls):
+        if time.monotonic() > end:
+            sys.exit(f"{heard} updates have come, and {cells.count(100)} cells are walls")
+        for grid in whole.take(10):
+            cells, width = list(grid.data), grid.info.width
+        for part in parts.take(100) if cells else []:
+            heard += 1
+            if heard == int(count):
+                print("hears updates", flush=True)
+            for row in range(part.height):
+                start = (part.y + row) * width + part.x
+                cells[start : start + part.width] = part.data[row * part.width : (row + 1) * part.width]
+        time.sleep(0.01)
+    json.dump(cells, sys.stdout)
+
+
+{f.__name__: f for f in (tf, frames, updates)}[sys.argv[1]](*sys.argv[2:])

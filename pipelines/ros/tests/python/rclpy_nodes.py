@@ -4,6 +4,7 @@ A message that is published may be bytes: rclpy sends them as they are.
 """
 
 import array
+import importlib
 import json
 import sys
 import time
@@ -107,5 +108,30 @@ def ask_for_more():
     sys.stdin.read()
 
 
+def fields_of(value):
+    """A message as JSON has it."""
+    if hasattr(value, "get_fields_and_field_types"):
+        return {name: fields_of(getattr(value, name)) for name in value.get_fields_and_field_types()}
+    if isinstance(value, (str, bytes, bool, int, float)):
+        return value
+    return [fields_of(one) for one in value]
+
+
+def read_log(log):
+    """Prints the messages of a log as JSON, a line each, where a package has their type."""
+    from mcap.reader import make_reader
+    from rclpy.serialization import deserialize_message
+
+    with open(log, "rb") as stream:
+        for schema, channel, message in make_reader(stream).iter_messages():
+            package, _, name = schema.name.split("/")
+            try:
+                kind = getattr(importlib.import_module(f"{package}.msg"), name)
+            except ModuleNotFoundError:
+                continue
+            value = deserialize_message(message.data, kind)
+            print(json.dumps({"topic": channel.topic, "type": schema.name, "message": fields_of(value)}))
+
+
 rclpy.init()
-{f.__name__: f for f in (robots, publish_map, publish_strings, view, ask_for_more)}[sys.argv[1]](*sys.argv[2:])
+{f.__name__: f for f in (robots, publish_map, publish_strings, view, ask_for_more, read_log)}[sys.argv[1]](*sys.argv[2:])
