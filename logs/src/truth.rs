@@ -30,9 +30,9 @@ struct TruthSink {
 }
 
 impl TruthSink {
-    fn new(TruthParameters { file }: TruthParameters, context: &Context) -> Result<Self, StageError> {
+    fn new(TruthParameters { file }: TruthParameters, _: &Context) -> Result<Self, StageError> {
         if file.as_os_str().is_empty() {
-            let doing = format!("write the truth of stage `{}`", context.stage);
+            let doing = "write the truth";
             return Err(StageError::new(doing, "it has no file").with_help("give --truth FILE or file = \"FILE\""));
         }
         Ok(Self { file })

@@ -22,7 +22,7 @@ use gridweave_logs::map_file::GridMap;
 use gridweave_logs::source::map_file::kind_of_maps;
 use gridweave_runtime::engine::Observer;
 use gridweave_runtime::message::Message;
-use gridweave_runtime::pipeline::Pipeline;
+use gridweave_runtime::pipeline::{Mode, Pipeline};
 use gridweave_runtime::ros::OccupancyGrid;
 use gridweave_runtime::stage::{Context, Output as StageOutput, Received, StageError, StageKind};
 use std::collections::BTreeSet;
@@ -137,8 +137,15 @@ impl MergeRequest {
         let kind = merged_map_kind(&merged);
         let job = Job { pipeline, inputs, output, options: &self.options(), registry: &shipped::registry(kinds) };
         let attach = |pipeline: &mut Pipeline| {
+            if pipeline.mode == Mode::Live {
+                // Its stages are processes, which cannot share what the program has.
+                let name = pipeline.name.as_str();
+                let text = format!("`{name}` is a live pipeline: start it by the command, `gridweave run {name}`");
+                return Err(BadUse(text).into());
+            }
             // A pipeline without maps has no merged map either.
             pipeline.attach(&kind, toml::Table::new(), "results", |_, _, output| output.topic == Some(MERGED));
+            Ok(())
         };
         let summary = job.run_with(attach, Watcher::Observer(observer))?;
         let map = merged.lock().unwrap_or_else(PoisonError::into_inner).take();

@@ -94,6 +94,10 @@ fn messages_are_printed_as_lines_of_json() {
         .assert(1, &["there is no topic `/mp` in the logs: did you mean `/map`?"]);
     gridweave(folder.path(), &["convert", "in.mcap", "-o", "out.mcap", "--topic", "/far/from/all"])
         .assert(1, &["there is no topic `/far/from/all` in the logs: the topics in them are: `/map`"]);
+    let renamed =
+        ["convert", "robot1=in.mcap", "-o", "out.mcap", "--topic", "/robot1/map", "--rename", "/robot1/map=/grid"];
+    gridweave(folder.path(), &renamed)
+        .assert(1, &["no topic `/robot1/map` in the logs once topics are renamed: it is `/grid`"]);
 
     // Whoever has read enough is no failure.
     let program = env!("CARGO_BIN_EXE_troubled_stages");

@@ -37,9 +37,9 @@ struct MapFileSink {
 }
 
 impl MapFileSink {
-    fn new(MapFileSinkParameters { file }: MapFileSinkParameters, context: &Context) -> Result<Self, StageError> {
+    fn new(MapFileSinkParameters { file }: MapFileSinkParameters, _: &Context) -> Result<Self, StageError> {
         if file.as_os_str().is_empty() {
-            let doing = format!("write the map file of stage `{}`", context.stage);
+            let doing = "write the map file";
             return Err(
                 StageError::new(doing, "it has no file").with_help("give --map FILE.yaml or file = \"FILE.yaml\"")
             );

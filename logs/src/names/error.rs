@@ -25,16 +25,21 @@ pub enum NameError {
         known: Vec<String>,
     },
     /// A selected topic is not in the logs.
-    #[error("there is no topic `{topic}` in the logs{}", nearest(.topic, .known))]
+    #[error("there is no topic `{topic}` in the logs{}", nearest(.topic, .renamed, .known))]
     NoSuchTopic {
         /// The selected topic.
         topic: String,
+        /// What a renaming makes of it, if one fits.
+        renamed: Option<String>,
         /// The topics in the logs, after renaming.
         known: Vec<String>,
     },
 }
 
-fn nearest(topic: &str, known: &[String]) -> String {
+fn nearest(topic: &str, renamed: &Option<String>, known: &[String]) -> String {
+    if let Some(renamed) = renamed.as_ref().filter(|renamed| known.contains(renamed)) {
+        return format!(" once topics are renamed: it is `{renamed}`");
+    }
     let known: Vec<&str> = known.iter().map(String::as_str).collect();
     suggest(topic, &known, "the topics in them are").map_or_else(String::new, |meant| format!(": {meant}"))
 }

@@ -57,7 +57,8 @@ pub(super) fn name(
     {
         let known: BTreeSet<&str> = drafts.iter().map(|draft| draft.channel.topic.as_str()).collect();
         let known = known.into_iter().map(str::to_owned).collect();
-        return Err(NameError::NoSuchTopic { topic: unknown.clone(), known });
+        let renamed = rules.renamed(unknown);
+        return Err(NameError::NoSuchTopic { topic: unknown.clone(), renamed, known });
     }
     let mut channels: Vec<BTreeMap<u16, NamedChannel>> = files.iter().map(|_| BTreeMap::new()).collect();
     for Draft { file, number, channel, robot, .. } in drafts {

@@ -46,9 +46,9 @@ struct PictureSink {
 }
 
 impl PictureSink {
-    fn new(PictureParameters { file }: PictureParameters, context: &Context) -> Result<Self, StageError> {
+    fn new(PictureParameters { file }: PictureParameters, _: &Context) -> Result<Self, StageError> {
         if file.as_os_str().is_empty() {
-            let doing = format!("draw the picture of stage `{}`", context.stage);
+            let doing = "draw the picture";
             return Err(StageError::new(doing, "it has no file")
                 .with_help("give --picture FILE.png (or .svg, .pdf) or file = \"FILE.png\""));
         }

@@ -77,7 +77,7 @@ impl McapSink {
             recorded_files,
         } = parameters;
         if file.as_os_str().is_empty() {
-            let doing = format!("write the log of stage `{}`", context.stage);
+            let doing = "write the log";
             return Err(StageError::new(doing, "it has no file").with_help("give --output LOG or file = \"LOG\""));
         }
         let log = OutputLog::create(&file, LogOptions { compression, chunk_size }).map_err(failure)?;

@@ -27,22 +27,22 @@ pub struct McapSource {
 impl McapSource {
     /// Opens the logs.
     pub fn new(parameters: SourceParameters, context: &Context) -> Result<Self, StageError> {
-        let doing = || format!("read the log of stage `{}`", context.stage);
+        let doing = "read the log";
         if parameters.files.is_empty() {
-            return Err(StageError::new(doing(), "no input file").with_help("give --input LOG or files = [...]"));
+            return Err(StageError::new(doing, "no input file").with_help("give --input LOG or files = [...]"));
         }
         if let Some(tf) = &context.robots.tf
             && !(tf.map_frame.contains("{robot}") && tf.base_frame.contains("{robot}"))
         {
             return Err(StageError::new(
-                doing(),
+                doing,
                 "the frames of `robots.tf` lack `{robot}`, the part that is the robot's name",
             )
             .with_help("write them as in map_frame = \"{robot}/map\""));
         }
-        let rules = parameters.rules().map_err(|error| StageError::new(doing(), error))?;
+        let rules = parameters.rules().map_err(|error| StageError::new(doing, error))?;
         let opened = names::open(&parameters.inputs(), &rules, &context.robots);
-        let (reader, names) = opened.map_err(|error| StageError::new(doing(), error))?;
+        let (reader, names) = opened.map_err(|error| StageError::new(doing, error))?;
         let origin = reader.files().iter().filter_map(LogFile::first_time).min().map_or(LogTime::MIN, LogTime);
         let names_robots = rules.convention == Convention::ByRobot;
         // What keeps the names of the log keeps its bytes.

@@ -44,7 +44,7 @@ struct SummarySink {
 impl SummarySink {
     fn new(SummaryParameters { file }: SummaryParameters, context: &Context) -> Result<Self, StageError> {
         if file.as_os_str().is_empty() {
-            let doing = format!("write the summary of stage `{}`", context.stage);
+            let doing = "write the summary";
             return Err(StageError::new(doing, "it has no file").with_help("give --summary FILE or file = \"FILE\""));
         }
         let from = context.inputs.iter().map(|wire| wire.from.clone()).collect();

@@ -23,7 +23,7 @@ def run(
     seed: int | None = None,
     progress: Progress = False,
 ) -> MergeResult:
-    """Runs a pipeline file, or the shipped pipeline of that name, on files.
+    """Runs a pipeline file, or the shipped pipeline of that name, on files. A live pipeline is started by the command instead.
 
     Args:
         pipeline: The file, or the name, such as ``"map_merge"``.

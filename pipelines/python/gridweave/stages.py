@@ -199,7 +199,7 @@ class Stage:
         outputs = [{"name": name, "type": ros_type(port.type), "topic": port.topic, "side": port.side,
                     "summary": port.summary} for name, port in cls._members(Output).items()]
         properties = {name: parameter.schema() for name, parameter in cls._members(Parameter).items()}
-        summary = " ".join((inspect.getdoc(cls) or cls.__name__).split("\n\n")[0].split())
+        summary = " ".join(inspect.cleandoc(cls.__dict__.get("__doc__") or cls.__name__).split("\n\n")[0].split())
         interface = {"protocol": PROTOCOL, "name": cls.__name__, "summary": summary, "inputs": inputs, "outputs": outputs,
                      "parameters": {"type": "object", "properties": properties, "additionalProperties": False}}
         own = {port["type"]: text for port in inputs + outputs if (text := definition(port["type"])) is not None}

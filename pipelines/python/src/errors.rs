@@ -8,13 +8,13 @@ create_exception!(
     gridweave,
     GridweaveError,
     PyException,
-    "A run of Gridweave has failed; the text says what, and what would mend it."
+    "A run of Gridweave has failed; the text says what, and what would fix it."
 );
 create_exception!(
     gridweave,
     RequestError,
     GridweaveError,
-    "What was asked for cannot be, such as a parameter that does not exist or a file that is no map."
+    "The request is wrong, such as a parameter that does not exist or a file that is no map."
 );
 
 /// The exception for an error of a run.

@@ -106,6 +106,8 @@ class PipelineTest(unittest.TestCase):
             self.run_own(raised, parameters={"own.level": "high"})
         with self.assertRaisesRegex(RequestError, "own"):
             run(self.path / "own.toml", [self.path / "a.yaml"], output=self.path / "out.mcap")
+        with self.assertRaisesRegex(RequestError, "gridweave run live_merge"):
+            run("live_merge")
         with self.assertRaisesRegex(RequestError, "no_such_pipeline"):
             run("no_such_pipeline")
 

@@ -39,6 +39,10 @@ class Corners(Stage):
         self.corner.send(sent, about.robot)
 
 
+class WithoutWords(Corners):
+    pass
+
+
 class StageTest(unittest.TestCase):
     def begin(self, kind, parameters=None):
         self.sent, self.warned = [], []
@@ -47,6 +51,7 @@ class StageTest(unittest.TestCase):
     def test_a_class_has_ports_and_parameters(self):
         interface = Corners.interface()
         self.assertEqual(interface["summary"], "Sends the pose of each map's corner.")
+        self.assertEqual(WithoutWords.interface()["summary"], "WithoutWords")
         self.assertEqual(interface["inputs"][0]["type"], "nav_msgs/msg/OccupancyGrid")
         self.assertTrue(interface["inputs"][0]["many"])
         self.assertEqual([port["name"] for port in interface["outputs"]], ["corner"])

@@ -95,11 +95,15 @@ impl Job<'_> {
 
     /// Runs the pipeline and writes all outputs. Shows the progress, and ends in order when the user interrupts it.
     pub(crate) fn run(&self) -> Result<RunSummary> {
-        self.run_with(|_| (), Watcher::Terminal)
+        self.run_with(|_| Ok(()), Watcher::Terminal)
     }
 
     /// The same with the stages that `attach` adds, and another watcher of the run.
-    pub(crate) fn run_with(&self, attach: impl FnOnce(&mut Pipeline), watcher: Watcher<'_>) -> Result<RunSummary> {
+    pub(crate) fn run_with(
+        &self,
+        attach: impl FnOnce(&mut Pipeline) -> Result<()>,
+        watcher: Watcher<'_>,
+    ) -> Result<RunSummary> {
         let bag = self.bag()?;
         let mut pipeline = shipped::load(self.pipeline, &self.overrides(bag.as_ref())?, self.registry)?;
         if self.output == Output::MapOnly {
@@ -108,7 +112,7 @@ impl Job<'_> {
         outputs::check(&pipeline, self.options)?;
         provenance::record(&mut pipeline);
         let sinks = ResultSinks::attach(&mut pipeline, self.options)?;
-        attach(&mut pipeline);
+        attach(&mut pipeline)?;
         if let Some(address) = &self.options.view {
             let address = view::attach(&mut pipeline, self.registry, address)?;
             eprint_line(format_args!(

@@ -39,17 +39,17 @@ enum Origin {
 impl MapFileSource {
     /// Names the robots. Each file is read when its map is sent.
     pub fn new(parameters: MapFileSourceParameters, context: &Context) -> Result<Self, StageError> {
-        let doing = || format!("read the map files of stage `{}`", context.stage);
+        let doing = "read the map files";
         if parameters.files.is_empty() {
             let help = "give --input FILE.yaml for each robot, or files = [...]";
-            return Err(StageError::new(doing(), "no input file").with_help(help));
+            return Err(StageError::new(doing, "no input file").with_help(help));
         }
-        let names = robot_names(&parameters.files).map_err(|error| StageError::new(doing(), error))?;
+        let names = robot_names(&parameters.files).map_err(|error| StageError::new(doing, error))?;
         let thresholds = if parameters.literal_thresholds { Thresholds::Literal } else { Thresholds::ByPicture };
         if let Some(robot) = parameters.resolutions.keys().find(|robot| !names.contains(robot)) {
             let help = format!("the robots are {}", names.join(", "));
             let error = format!("`resolutions` names `{robot}`, which has no map");
-            return Err(StageError::new(doing(), error).with_help(help));
+            return Err(StageError::new(doing, error).with_help(help));
         }
         let files = names.into_iter().zip(parameters.files).map(|(robot, file)| {
             let resolution = parameters.resolutions.get(&robot).copied();

@@ -17,13 +17,13 @@ pub struct TopologyFileSource {
 
 impl TopologyFileSource {
     /// Names the robots. Each file is read when its map is sent.
-    pub fn new(parameters: TopologyFileSourceParameters, context: &Context) -> Result<Self, StageError> {
-        let doing = || format!("read the topological maps of stage `{}`", context.stage);
+    pub fn new(parameters: TopologyFileSourceParameters, _: &Context) -> Result<Self, StageError> {
+        let doing = "read the topological maps";
         if parameters.files.is_empty() {
             let help = "give files = [...], a JSON file for each robot";
-            return Err(StageError::new(doing(), "no input file").with_help(help));
+            return Err(StageError::new(doing, "no input file").with_help(help));
         }
-        let names = robot_names(&parameters.files).map_err(|error| StageError::new(doing(), error))?;
+        let names = robot_names(&parameters.files).map_err(|error| StageError::new(doing, error))?;
         let mut maps: Vec<(String, PathBuf)> = names.into_iter().zip(parameters.files).collect();
         maps.sort();
         Ok(Self { maps, sent: 0 })

@@ -173,7 +173,8 @@ fn who_hears_updates_has_the_map_by_them() {
     assert_eq!(line, "hears updates", "{}", viewer.errors());
     // Whatever has come in which order before, the last map counts.
     give(&mut sink, 0, "/map", walls_up_to(300));
-    let cells: Vec<i64> = serde_json::from_str(&lines.next().expect(&viewer.errors()).unwrap()).unwrap();
+    let cells: Vec<i64> =
+        serde_json::from_str(&lines.next().unwrap_or_else(|| panic!("{}", viewer.errors())).unwrap()).unwrap();
     assert!(cells.len() == 1600 && cells[..300].iter().all(|cell| *cell == 100), "{cells:?}");
 }
 

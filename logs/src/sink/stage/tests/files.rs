@@ -72,10 +72,7 @@ fn bad_paths_are_errors_with_a_fix() {
     let error = |path: &Path| make(path, "").err().unwrap().to_string();
     let at = |name: &str| folder.path().join(name);
 
-    assert_eq!(
-        error(Path::new("")),
-        "cannot write the log of stage `sink`: it has no file; give --output LOG or file = \"LOG\""
-    );
+    assert_eq!(error(Path::new("")), "cannot write the log: it has no file; give --output LOG or file = \"LOG\"");
     assert!(error(folder.path()).ends_with("is a folder; name a file in it"));
     let missing = at("missing");
     let expected = format!("there is no folder {}; create it, or name a file elsewhere", missing.display());
