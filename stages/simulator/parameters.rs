@@ -3,6 +3,7 @@
 use super::floor_plan::{BuildingSize, Layout};
 use super::lidar::Lidar;
 use super::tags::TagReader;
+use super::wheel_odometry::OdometryErrors;
 use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -82,6 +83,25 @@ pub struct SimulatorParameters {
     pub resolution: Vec<f64>,
     /// Whether the scans of the lidars are logged as well.
     pub scans: bool,
+    /// Whether raw odometry of the wheels is logged as well. The errors that follow are as large as in the public logs Intel and
+    /// CSAIL; the systematic ones differ from robot to robot.
+    pub odometry: bool,
+    /// Standard deviation over robots of the scale of the distance by odometry, as a share.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub odometry_scale: f64,
+    /// Standard deviation over robots of the scale of the turn by odometry, as a share.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub odometry_turn_scale: f64,
+    /// Standard deviation over robots of the turn that odometry adds on the way, radians a metre.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub odometry_yaw_drift: f64,
+    /// Standard deviation of the random error of odometry after one metre, of the heading in radians and of the distance in
+    /// metres; it grows with the square root of the distance.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub odometry_noise: f64,
+    /// Mean number of times that the wheels slip on 100 metres, each by up to 0.3 m and 0.4 radians.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub odometry_slips: f64,
     /// Share of a map's free cells that are set to occupied, as by people's legs, dust and glass.
     #[schemars(range(min = 0.0, max = 0.1))]
     pub specks: f64,
@@ -135,6 +155,12 @@ impl Default for SimulatorParameters {
             correction_length: 10.0,
             resolution: vec![0.05],
             scans: false,
+            odometry: false,
+            odometry_scale: 0.03,
+            odometry_turn_scale: 0.06,
+            odometry_yaw_drift: 0.04,
+            odometry_noise: 0.07,
+            odometry_slips: 0.0,
             specks: 0.0,
             snapshots: 3,
             map_yaw: PI,
@@ -161,6 +187,15 @@ impl SimulatorParameters {
             reach: self.lidar_range,
             noise: self.lidar_noise,
             dropped: self.dropped_beams,
+        }
+    }
+
+    pub(super) fn odometry_errors(&self) -> OdometryErrors {
+        OdometryErrors {
+            scale: [self.odometry_scale, self.odometry_turn_scale],
+            yaw_drift: self.odometry_yaw_drift,
+            noise: self.odometry_noise,
+            slips: self.odometry_slips,
         }
     }
 

@@ -1,13 +1,14 @@
 //! One robot of a simulation: its drive, its estimates and its log.
 
+use super::drift::{Drift, estimate_poses};
 use super::drive::{DriveLimits, drive};
 use super::lidar::Beam;
 use super::mapper::Mapper;
-use super::odometry::{Drift, estimate_poses};
 use super::parameters::SimulatorParameters;
 use super::route::plan_route;
 use super::shape::{Rectangle, between};
 use super::tags::TagReading;
+use super::wheel_odometry::wheel_odometry;
 use super::world::{SimulationError, Stream, World};
 use crate::shared::geometry::{Point2, Pose2, is_free, pose};
 use crate::shared::scan_grid::SnapshotMap;
@@ -33,6 +34,9 @@ pub struct RobotLog {
     pub true_poses: Vec<Pose2>,
     /// Estimated poses in its map frame, one per tick.
     pub poses: Vec<Pose2>,
+    /// Poses by the odometry of its wheels, in a frame that is its map frame at the start, one per tick; none if odometry is not
+    /// logged.
+    pub odometry: Vec<Pose2>,
     /// The tags that it has read, with their ticks.
     pub readings: Vec<(usize, TagReading)>,
     /// Scans of its lidar, one per tick; none if scans are not logged.
@@ -67,13 +71,18 @@ pub(super) fn simulate_robot(
     let drift = Drift { deviation: parameters.drift, correction_length: parameters.correction_length };
     let poses = estimate_poses(&exact, &drift, &mut world.random(Stream::Drift(robot)));
 
+    let odometry = match parameters.odometry {
+        true => wheel_odometry(&exact, &parameters.odometry_errors(), &mut world.random(Stream::Odometry(robot))),
+        false => Vec::new(),
+    };
+
     let mut scans = Vec::new();
     let maps = map_building(world, robot, &true_poses, &poses, parameters, &mut scans);
     if maps.len() != parameters.snapshots as usize {
         return Err(SimulationError::SeenNothing { robot: name });
     }
     let readings = read_tags(world, robot, &true_poses, parameters);
-    Ok(RobotLog { name, transform_building_map, true_poses, poses, readings, scans, maps })
+    Ok(RobotLog { name, transform_building_map, true_poses, poses, odometry, readings, scans, maps })
 }
 
 /// A map frame near the start of the drive, with a random rotation: `T_building_map`.

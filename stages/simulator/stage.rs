@@ -7,8 +7,8 @@ use super::simulation::{Simulation, simulate};
 use crate::shared::geometry::Pose2;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{
-    GridPrefix, Header, LaserScan, MapMetaData, OccupancyGrid, PoseStamped, SimulationTruth, TFMessage, TagRange,
-    TransformStamped,
+    GridPrefix, Header, LaserScan, MapMetaData, OccupancyGrid, Odometry, PoseStamped, PoseWithCovariance,
+    SimulationTruth, TFMessage, TagRange, TransformStamped,
 };
 use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Source, StageError, StageKind};
 
@@ -33,6 +33,7 @@ struct SimulatedLog {
     tags: Out<TagRange>,
     tf: Out<TFMessage>,
     scan: Out<LaserScan>,
+    odometry: Out<Odometry>,
     truth: Out<SimulationTruth>,
 }
 
@@ -44,6 +45,11 @@ impl Outputs for SimulatedLog {
             tags: ports.output_on("/{robot}/tag_ranges", "tags", "Ranges of radio tags in reach, at 10 Hz."),
             tf: ports.output_on("/tf", "tf", "The same poses: robotN/map to robotN/base_link."),
             scan: ports.output_on("/{robot}/scan", "scan", "Each robot's scans, at 10 Hz, if `scans` says so."),
+            odometry: ports.output_on(
+                "/{robot}/odom",
+                "odometry",
+                "Each robot's odometry in robotN/odom, at 10 Hz, if `odometry` says so.",
+            ),
             truth: ports.output_on(
                 "/truth",
                 "truth",
@@ -79,6 +85,7 @@ struct Event {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum What {
     Pose(usize),
+    Odometry(usize),
     Reading(usize),
     Scan(usize),
     Map(usize),
@@ -102,6 +109,7 @@ impl Source for Simulator {
         if let Some(log) = playback.simulation.robots.get(robot) {
             match what {
                 What::Pose(index) => send_pose(output, log, index)?,
+                What::Odometry(index) => send_odometry(output, log, index)?,
                 What::Reading(index) => send_reading(output, &playback.simulation, log, index, &self.parameters)?,
                 What::Scan(index) => send_scan(output, log, index, &self.parameters)?,
                 What::Map(index) => send_map(output, log, index)?,
@@ -124,6 +132,7 @@ impl Playback {
         for (robot, log) in simulation.robots.iter().enumerate() {
             let mut add = |tick, what| events.push(Event { time: time_of(tick, what), robot, what });
             (0..log.poses.len()).for_each(|tick| add(tick, What::Pose(tick)));
+            (0..log.odometry.len()).for_each(|tick| add(tick, What::Odometry(tick)));
             (0..log.scans.len()).for_each(|tick| add(tick, What::Scan(tick)));
             log.readings.iter().enumerate().for_each(|(index, (tick, _))| add(*tick, What::Reading(index)));
             log.maps.iter().enumerate().for_each(|(index, (tick, _))| add(*tick, What::Map(index)));
@@ -154,6 +163,17 @@ fn send_pose(output: &Output<SimulatedLog>, log: &RobotLog, index: usize) -> Res
     let transform: Pose2 = *pose;
     let transform = TransformStamped { header, child_frame_id: base_frame(log), transform: transform.into() };
     output.tf.send("", &TFMessage { transforms: vec![transform] })
+}
+
+fn send_odometry(output: &Output<SimulatedLog>, log: &RobotLog, index: usize) -> Result<(), StageError> {
+    let Some(pose) = log.odometry.get(index) else { return Ok(()) };
+    let message = Odometry {
+        header: Header::new(output.log_time(), format!("{}/odom", log.name)),
+        child_frame_id: base_frame(log),
+        pose: PoseWithCovariance { pose: (*pose).into(), ..Default::default() },
+        ..Default::default()
+    };
+    output.odometry.send(&log.name, &message)
 }
 
 fn send_reading(
@@ -265,6 +285,25 @@ mod tests {
             assert!(Grid::from_message(&map).unwrap().occupied().count() > 50);
             assert_eq!(map.header.frame_id, format!("{}/map", message.robot()));
         }
+    }
+
+    #[test]
+    fn odometry_begins_at_the_first_pose_and_drifts_off() {
+        let context = Context { stage: "world".into(), seed: 1, ..Default::default() };
+        let parameters = format!("{WORLD}\nodometry = true\ndrift = 0.0");
+        let mut stage = StageHarness::with_context(&kind(), &parameters, &context).unwrap();
+        while stage.node().advance().unwrap() {}
+        let of_robot = |message: &&Message| message.robot() == "robot1";
+        let [poses, odometry] = ["pose", "odometry"].map(|port| stage.take_messages(port));
+        let poses: Vec<PoseStamped> = poses.iter().filter(of_robot).map(|pose| pose.decode().unwrap()).collect();
+        let odometry: Vec<Odometry> = odometry.iter().filter(of_robot).map(|pose| pose.decode().unwrap()).collect();
+        assert_eq!(odometry.len(), poses.len());
+        assert_eq!(odometry[0].header.frame_id, "robot1/odom");
+        let off = |index: usize| {
+            let (pose, by_odometry) = (&poses[index].pose.position, &odometry[index].pose.pose.position);
+            (pose.x - by_odometry.x).hypot(pose.y - by_odometry.y)
+        };
+        assert!(off(0) < 1e-9 && off(poses.len() - 1) > 0.02, "{}", off(poses.len() - 1));
     }
 
     #[test]

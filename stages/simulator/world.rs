@@ -50,6 +50,7 @@ pub(super) enum Stream {
     Tags(usize),
     Specks(usize),
     Furniture(usize),
+    Odometry(usize),
 }
 
 impl World {
@@ -92,6 +93,7 @@ fn random(seed: u64, stream: Stream) -> ChaCha8Rng {
         Stream::Specks(robot) => (7, robot),
         // After the streams of the largest number of robots.
         Stream::Furniture(robot) => (0, 64 + robot),
+        Stream::Odometry(robot) => (1, 64 + robot),
     };
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(robot as u64 * 8 + purpose);

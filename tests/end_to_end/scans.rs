@@ -71,8 +71,8 @@ fn robots_with_scans_alone_are_merged() {
 }
 
 /// Writes a log again with odometry in place of poses, which finds every way 3 % too long, and with lidars that are mounted
-/// askew. The odometry is in tf alone if `in_tf`.
-fn with_odometry(log: &Path, to: &Path, in_tf: bool) {
+/// askew, which tf says if `is_mounted`. The odometry is in tf alone if `in_tf`.
+fn with_odometry(log: &Path, to: &Path, in_tf: bool, is_mounted: bool) {
     const ASKEW: f64 = 0.3;
     let bytes = std::fs::read(log).unwrap();
     let mut written = LogBuilder::new(to);
@@ -81,7 +81,9 @@ fn with_odometry(log: &Path, to: &Path, in_tf: bool) {
         child_frame_id: format!("{robot}/laser"),
         transform: Isometry2::rotation(ASKEW).into(),
     };
-    written.message(0.0, "/tf_static", &TFMessage { transforms: ["robot1", "robot2"].map(mounted).to_vec() });
+    if is_mounted {
+        written.message(0.0, "/tf_static", &TFMessage { transforms: ["robot1", "robot2"].map(mounted).to_vec() });
+    }
     let mut start = None;
     for message in mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap) {
         let seconds = (message.log_time - *start.get_or_insert(message.log_time)) as f64 * 1e-9;
@@ -121,10 +123,38 @@ fn robots_with_scans_and_odometry_alone_are_merged() {
     let small = ["--set", "width=12", "--set", "height=10", "--set", "tags=0", "--set", "map_offset=0"];
     simulate(folder, "in.mcap", &[&world[..], &small].concat());
     for (in_tf, along) in [(false, "`/robot1/odom`"), (true, "tf (robot1/odom to robot1/base_link)")] {
-        with_odometry(&folder.join("in.mcap"), &folder.join("scans.mcap"), in_tf);
+        with_odometry(&folder.join("in.mcap"), &folder.join("scans.mcap"), in_tf, true);
         let method = format!("by SLAM, with the odometry of {along}");
         gridweave(folder, &["info", "scans.mcap"]).assert(0, &[&method]);
         merge(folder).assert(0, &["no map of robot1, robot2: maps are built from scans", "merged 2 of 2"]);
         assert_eq!(judged(folder), [1, 0].map(Value::from));
     }
+    with_odometry(&folder.join("in.mcap"), &folder.join("scans.mcap"), false, false);
+    let lidar = |value: &str| {
+        let given = ["robot1", "robot2"].map(|robot| format!("--lidar={robot}={value}"));
+        let options = ["merge", "scans.mcap", "-o", "out.mcap", "--summary", "summary.json"];
+        gridweave(folder, &options.into_iter().chain(given.iter().map(String::as_str)).collect::<Vec<_>>())
+    };
+    let ended = lidar("0,0,0.3");
+    ended.assert(0, &["merged 2 of 2"]);
+    assert!(!ended.text().contains("tf has no transform"), "{}", ended.text());
+    assert_eq!(judged(folder), [1, 0].map(Value::from));
+    for wrong in ["0,0", "0,0,nan", "0,0,0,0", "ahead"] {
+        lidar(wrong).assert(2, &["--lidar robot1=", "write ROBOT=X,Y,YAW"]);
+    }
+}
+
+/// Odometry as bad as that of public logs: the maps are built by SLAM, and merged.
+#[test]
+fn robots_whose_odometry_drifts_are_merged() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let world =
+        ["--robots", "2", "--seed", "5", "--set", "overlap=0.9", "--set", "scans=true", "--set", "odometry=true"];
+    let small = ["--set", "width=12", "--set", "height=10", "--set", "tags=0", "--set", "odometry_slips=1"];
+    simulate(folder, "in.mcap", &[&world[..], &small].concat());
+    let raw = ["filter", "in.mcap", "-o", "scans.mcap", "--topics", "/{robot}/scan,/{robot}/odom"];
+    gridweave(folder, &raw).assert(0, &[]);
+    merge(folder).assert(0, &["maps are built from scans", "merged 2 of 2"]);
+    assert_eq!(judged(folder), [1, 0].map(Value::from));
 }

@@ -7,6 +7,7 @@ pub(crate) mod progress;
 mod provenance;
 mod reading;
 mod results;
+mod robot_options;
 mod view;
 
 pub(crate) use inputs::{Inputs, is_yaml};
@@ -180,38 +181,6 @@ impl Job<'_> {
         }
     }
 
-    /// The hypotheses that the user accepts, as a parameter of the verifier.
-    fn accepted(&self) -> Result<toml::Table, BadUse> {
-        let read = |typed: &String| {
-            let (robot, number) = typed.rsplit_once('=')?;
-            let number = if number == "initial" { 0 } else { number.parse().ok().filter(|number| *number > 0)? };
-            Some((self.robot(robot), toml::Value::Integer(number)))
-        };
-        let wrong = |typed: &String| {
-            BadUse(format!(
-                "`--accept {typed}` is wrong: write ROBOT=N for a hypothesis that a refusal has listed, from 1, or ROBOT=initial \
-                 for its initial pose as it is"
-            ))
-        };
-        self.options.accept.iter().map(|typed| read(typed).ok_or_else(|| wrong(typed))).collect()
-    }
-
-    /// The resolutions that the user gives, as a parameter of the source of map files.
-    fn resolutions(&self) -> Result<toml::Table, BadUse> {
-        if !self.inputs.is_empty() && Inputs::of(self.inputs)? != Inputs::MapFiles {
-            return Err(BadUse("--resolution is for map files (YAML), and the inputs are others".to_owned()));
-        }
-        let read = |typed: &String| {
-            let (robot, side) = typed.rsplit_once('=')?;
-            let side = side.parse().ok().filter(|side: &f64| side.is_finite() && *side > 0.0)?;
-            Some((self.robot(robot), toml::Value::Float(side)))
-        };
-        let wrong = |typed: &String| {
-            BadUse(format!("`--resolution {typed}` is wrong: write ROBOT=METRES for the side of a cell, above 0"))
-        };
-        self.options.resolution.iter().map(|typed| read(typed).ok_or_else(|| wrong(typed))).collect()
-    }
-
     /// The settings of the pipeline; its log is in the bag, if there is one.
     fn overrides(&self, bag: Option<&Bag>) -> Result<Overrides> {
         let mut overrides = Overrides::default();
@@ -219,7 +188,7 @@ impl Job<'_> {
         overrides.seed = self.options.seed;
         overrides.initial_poses = self.options.initial.iter().map(|typed| self.robot_first(typed)).collect();
         if !self.options.accept.is_empty() {
-            overrides.set_for_kind(VERIFIER, "hypotheses", self.accepted()?);
+            overrides.set_for_kind(VERIFIER, "hypotheses", robot_options::accepted(self)?);
         }
         if !self.inputs.is_empty() {
             let files: Vec<String> = self.inputs.iter().map(|path| text_of(path)).collect::<Result<_>>()?;
@@ -234,7 +203,10 @@ impl Job<'_> {
             overrides.set_for_kind(inputs.source_kind(), "literal_thresholds", true);
         }
         if !self.options.resolution.is_empty() {
-            overrides.set_for_kind(Inputs::MapFiles.source_kind(), "resolutions", self.resolutions()?);
+            overrides.set_for_kind(Inputs::MapFiles.source_kind(), "resolutions", robot_options::resolutions(self)?);
+        }
+        if !self.options.lidar.is_empty() {
+            overrides.set_for_kind(Inputs::Logs.source_kind(), "lidars", robot_options::lidars(self)?);
         }
         if self.options.results_only {
             overrides.set_for_kind(LOG_SINK, "pass_input", false);

@@ -45,6 +45,9 @@ pub(crate) struct RunOptions {
     /// The side of a cell of a robot's map file, metres, instead of the resolution in the file.
     #[arg(long, value_name = "ROBOT=METRES")]
     pub(crate) resolution: Vec<String>,
+    /// The pose of a robot's lidar on its base, metres and radians, where the log's tf lacks it.
+    #[arg(long, value_name = "ROBOT=X,Y,YAW", allow_hyphen_values = true)]
+    pub(crate) lidar: Vec<String>,
     #[command(flatten)]
     pub(crate) reading: ReadingOptions,
     /// Set a parameter of a stage.

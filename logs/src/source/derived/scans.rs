@@ -66,8 +66,8 @@ impl DerivedScans {
             }
             output.warn(format!(
                 "tf has no transform from `{frame}`, the frame of `{topic}`, to the base of {}: the lidar is taken to be at \
-                 the base and to look ahead. If it does not, log its mount on /tf_static, or set it: \
-                 `lidars` of the source, {{{0} = [X, Y, YAW]}}",
+                 the base and to look ahead. If it does not, log its mount on /tf_static, or give \
+                 it: --lidar {0}=X,Y,YAW (`lidars` of the source)",
                 route.robot
             ));
         }
