@@ -98,7 +98,7 @@ impl SlamMap {
 
     /// Looks for the last loop closures, when there will be no more scans.
     pub(super) fn finish(&mut self) {
-        if self.trajectory.finish_submap() {
+        if self.trajectory.finish() {
             self.forget_map();
         }
     }

@@ -69,7 +69,7 @@ pub(super) fn find_loop_closures(revisit: &Revisit<'_>) -> Vec<Constraint> {
 }
 
 /// The scan in the middle of a submap, whose pose is that of the submap.
-fn middle(scans: &Range<usize>) -> usize {
+pub(super) fn middle(scans: &Range<usize>) -> usize {
     (scans.start + scans.end) / 2
 }
 
@@ -88,6 +88,17 @@ impl Revisit<'_> {
         scans.clone().flat_map(of_scan).collect()
     }
 
+    /// The walls of a submap and of those before and after it, as the later one need not begin where it did, from scans
+    /// before `until`, in the frame of the submap's middle scan.
+    pub(super) fn map_around(&self, submap: usize, until: usize) -> LocalMap {
+        let poses = &self.graph.poses;
+        let first = self.submaps[submap.saturating_sub(1)].start;
+        let after = self.submaps.get(submap + 1).filter(|after| after.end <= until);
+        let last = after.map_or(self.submaps[submap].end, |after| after.end);
+        let into = poses[middle(&self.submaps[submap])].inverse();
+        LocalMap::new((first..last).map(|scan| (into * poses[scan], &self.scans[scan][..])))
+    }
+
     /// Looks for the points of the scan `centre` and those around it in an earlier submap. `covariance` is that of
     /// the earlier submap in the frame of `centre`.
     fn find_in(
@@ -100,13 +111,8 @@ impl Revisit<'_> {
         let poses = &self.graph.poses;
         let at = middle(&self.submaps[other]);
         let deviations = [(covariance.m11 + covariance.m22).sqrt(), covariance.m33.sqrt()];
-        // The submaps before and after it, too: the later one need not begin where it did.
-        let first = self.submaps[other.saturating_sub(1)].start;
-        let after = self.submaps.get(other + 1).filter(|after| after.end <= self.recent);
-        let last = after.map_or(self.submaps[other].end, |after| after.end);
-        let into = poses[at].inverse();
-        let map = LocalMap::new((first..last).map(|scan| (into * poses[scan], &self.scans[scan][..])));
-        let mean = into * poses[centre];
+        let map = self.map_around(other, self.recent);
+        let mean = poses[at].inv_mul(&poses[centre]);
         let half = |axis: usize| (WINDOW * deviations[axis]).clamp(LEAST_WINDOW[axis], LARGEST_WINDOW[axis]);
         let window = [half(0), half(0), half(1)];
         let information = turned_information(&covariance.try_inverse()?, &mean.rotation);

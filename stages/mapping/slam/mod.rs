@@ -4,7 +4,8 @@
 //! odometry finds the basin (Olson 2009), and point-to-line registration the pose (Censi 2008). Scans are gathered in
 //! submaps of some metres. A finished submap is searched in each earlier one that may be at the same place, by branch
 //! and bound on a likelihood field; what fits, and fits nowhere else, becomes a loop closure. Scans are the nodes of a
-//! pose graph, whose most likely poses are solved for after each closure, with a robust weight for closures.
+//! pose graph, whose most likely poses are solved for after each closure, with a robust weight for closures. At the end
+//! each scan is registered on what was seen at its place at other times.
 //!
 //! The division into a local registration and submaps that are searched for loop closures by branch and bound is that
 //! of Cartographer (Hess et al. 2016, "Real-time loop closure in 2D LIDAR SLAM"); a local map of the last scans, and a
@@ -17,6 +18,7 @@ mod local_map;
 mod loop_closure;
 mod odometry_noise;
 mod pose_graph;
+mod revisits;
 mod scan_points;
 mod scan_registration;
 #[cfg(test)]

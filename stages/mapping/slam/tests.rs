@@ -93,9 +93,18 @@ fn a_drive_around_a_block_is_closed_though_odometry_turns_too_far() {
         has_moved |= trajectory.add(&moved, scan(&walls, at, &mut random));
     }
     has_moved |= trajectory.finish_submap();
+    let (closed, start) = (error(trajectory.poses(), &truth), trajectory.poses()[..5].to_vec());
+    assert!(trajectory.finish());
+    for (now, before) in trajectory.poses().iter().zip(&start) {
+        let off = before.inv_mul(now);
+        assert!(
+            off.translation.vector.norm() < 0.05 && off.rotation.angle().abs() < 0.02,
+            "the frame has moved: {off}"
+        );
+    }
     let (before, after) = (error(&odometry, &truth), error(trajectory.poses(), &truth));
     assert!(before > 3.0, "odometry alone is off by {before} m");
-    assert!(after < 0.15, "{after} m");
+    assert!(closed < 0.15 && after < closed, "{closed} m, and {after} m with what was seen at other times");
     assert!(has_moved && trajectory.closures().next().is_some());
     assert_eq!((trajectory.unmatched(), trajectory.poses().len()), (0, truth.len()));
     for closure in trajectory.closures() {

@@ -4,10 +4,11 @@ use super::local_map::LocalMap;
 use super::loop_closure::{Revisit, find_loop_closures};
 use super::odometry_noise::OdometryNoise;
 use super::pose_graph::{Constraint, PoseGraph, turned_information};
+use super::revisits::register_on_revisited;
 use super::scan_points::ScanPoint;
 use super::scan_registration::register;
 use crate::shared::geometry::Pose2;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitComplex, Vector2, Vector3};
 use std::ops::Range;
 
 /// Number of scans before one that make up its local map, at most, and the path that they may span, metres.
@@ -16,6 +17,10 @@ const RECENT_PATH: f64 = 20.0;
 /// Path of a submap, metres, and number of its scans, at most.
 const SUBMAP_PATH: f64 = 4.0;
 const SUBMAP_SCANS: usize = 30;
+/// How often the scans are registered on those of other times at the end, at most, and the move of a scan, metres, below
+/// which they are registered no more.
+const REFINEMENTS: usize = 8;
+const LEAST_REFINEMENT: f64 = 0.005;
 /// Share of its points that must lie on the local map, for a scan to be registered at all.
 const LEAST_MATCHED: f64 = 0.15;
 /// Distance of an earlier submap from the robot, metres, up to which it is part of the local map once a loop closure
@@ -153,6 +158,49 @@ impl Trajectory {
         }
         self.revisited = self.tied_submaps(recent);
         has_moved
+    }
+
+    /// Finishes the last submap, and registers each scan on what was seen at its place at other times. Returns whether
+    /// scans have moved.
+    pub fn finish(&mut self) -> bool {
+        let mut has_moved = self.finish_submap();
+        let start: Vec<Pose2> =
+            self.submaps.first().map_or_else(Vec::new, |first| self.graph.poses[first.clone()].to_vec());
+        let known = self.graph.constraints.len();
+        for _ in 0..REFINEMENTS {
+            let recent = self.scans.len();
+            let revisit = Revisit { graph: &self.graph, scans: &self.scans, submaps: &self.submaps, recent };
+            let found = register_on_revisited(&revisit, RECENT_SCANS);
+            if found.is_empty() {
+                break;
+            }
+            self.graph.constraints.truncate(known);
+            self.graph.constraints.extend(found);
+            let before = self.graph.poses.clone();
+            self.graph.optimize();
+            has_moved = true;
+            let moves = before.iter().zip(&self.graph.poses);
+            let moved = moves.map(|(before, after)| (after.translation.vector - before.translation.vector).norm());
+            if moved.fold(0.0, f64::max) < LEAST_REFINEMENT {
+                break;
+            }
+        }
+        self.hold(&start);
+        has_moved
+    }
+
+    /// Moves all poses rigidly so that those of the first scans are where they were: the frame is known by all of these
+    /// better than by the first.
+    fn hold(&mut self, start: &[Pose2]) {
+        let poses = &self.graph.poses;
+        let apart = |(now, before): (&Pose2, &Pose2)| (before.rotation / now.rotation).angle();
+        let turns = poses.iter().zip(start).map(apart);
+        let share = 1.0 / start.len().max(1) as f64;
+        let turn = UnitComplex::new(turns.sum::<f64>() * share);
+        let shift = |(now, before): (&Pose2, &Pose2)| before.translation.vector - turn * now.translation.vector;
+        let shift = poses.iter().zip(start).map(shift).sum::<Vector2<f64>>() * share;
+        let by = Pose2::from_parts(shift.into(), turn);
+        self.graph.poses.iter_mut().for_each(|pose| *pose = by * *pose);
     }
 
     /// The earlier submaps around the last scan, whose pose relative to it is well known.
