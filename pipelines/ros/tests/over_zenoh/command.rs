@@ -83,7 +83,7 @@ impl Running {
     /// Waits for its end, and gives the status and what it has printed.
     #[track_caller]
     pub(crate) fn end(&mut self) -> (i32, String) {
-        let mut stdout = self.child.stdout.take().unwrap();
+        let mut stdout = self.take_stdout();
         let reader = thread::spawn(move || {
             let mut text = String::new();
             stdout.read_to_string(&mut text).unwrap();
