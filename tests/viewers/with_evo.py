@@ -7,35 +7,17 @@ Needs what requirements.txt names.
 
 import json
 import math
-import os
 import re
-import signal
-import subprocess
 import sys
-import tempfile
 import zipfile
 from pathlib import Path
 
-WATCHDOG = 110
+from harness import check, finish, gridweave, run
+
 # Root mean square and largest distance of a path from the truth, metres.
 RMSE, LARGEST = 0.05, 0.12
 
-gridweave = str(Path(sys.argv[1]).resolve())
 programs = Path(sys.executable).parent
-failed = 0
-
-
-def check(what, holds, found=""):
-    global failed
-    failed += not holds
-    print(f"{'ok     ' if holds else 'FAILED '}{what}{'' if holds else f': {found}'}", flush=True)
-
-
-def run(folder, *command):
-    ended = subprocess.run([str(word) for word in command], cwd=folder, capture_output=True, text=True, timeout=60)
-    if ended.returncode != 0:
-        raise RuntimeError(f"{' '.join(map(str, command))} ended with {ended.returncode}: {ended.stdout}{ended.stderr}")
-    return ended.stdout
 
 
 def write_truth(folder, robot, frame):
@@ -77,20 +59,5 @@ def read(folder):
         check(f"and nowhere {LARGEST} m off", found["max"] < LARGEST, found)
 
 
-def stop(number, _):
-    raise TimeoutError(f"not done within {WATCHDOG} s" if number == signal.SIGALRM else "stopped")
-
-
-for number in (signal.SIGALRM, signal.SIGTERM, signal.SIGINT):
-    signal.signal(number, stop)
-signal.alarm(WATCHDOG)
-with tempfile.TemporaryDirectory(prefix="gridweave-evo-") as folder:
-    # Where evo keeps its settings.
-    os.environ.update(HOME=folder, MPLBACKEND="Agg")
-    try:
-        read(Path(folder))
-    except Exception as error_found:  # whatever it is, the others are told
-        check("the test comes to its end", False, repr(error_found))
-    signal.alarm(0)
-print("all is well" if not failed else f"{failed} failed", flush=True)
-sys.exit(1 if failed else 0)
+# The folder is also where evo keeps its settings.
+finish(read, "evo", MPLBACKEND="Agg")

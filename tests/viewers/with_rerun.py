@@ -11,7 +11,6 @@ import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import time
 from collections import defaultdict
 from pathlib import Path
@@ -20,27 +19,12 @@ import numpy as np
 from PIL import Image
 from rerun.experimental import ViewerClient
 
-WATCHDOG = 110
+from harness import check, finish, gridweave, run
+
 SCRIPT = Path(__file__).resolve().parents[2] / "pipelines/viewers/rerun_view.py"
 # Unknown cells, and the paths and walls of the robots.
 COLOURS = {"unknown": (112, 137, 134), "robot1": (0, 114, 178), "robot2": (213, 94, 0), "robot3": (0, 158, 115)}
 ROBOTS = "robot1", "robot2", "robot3"
-
-gridweave = str(Path(sys.argv[1]).resolve())
-failed = 0
-
-
-def check(what, holds, found=""):
-    global failed
-    failed += not holds
-    print(f"{'ok     ' if holds else 'FAILED '}{what}{'' if holds else f': {found}'}", flush=True)
-
-
-def run(folder, *command):
-    ended = subprocess.run([str(word) for word in command], cwd=folder, capture_output=True, text=True, timeout=60)
-    if ended.returncode != 0:
-        raise RuntimeError(f"{' '.join(map(str, command))} ended with {ended.returncode}: {ended.stdout}{ended.stderr}")
-    return ended.stdout
 
 
 def opened(viewer, file):
@@ -138,20 +122,5 @@ def shown(folder):
         end(program)
 
 
-def stop(number, _):
-    raise TimeoutError(f"not done within {WATCHDOG} s" if number == signal.SIGALRM else "stopped")
-
-
-for number in (signal.SIGALRM, signal.SIGTERM, signal.SIGINT):
-    signal.signal(number, stop)
-signal.alarm(WATCHDOG)
-with tempfile.TemporaryDirectory(prefix="gridweave-rerun-") as folder:
-    # Where Rerun keeps its settings.
-    os.environ.update(HOME=folder, XDG_RUNTIME_DIR=folder, XDG_CONFIG_HOME=folder, XDG_DATA_HOME=folder, XDG_CACHE_HOME=folder)
-    try:
-        shown(Path(folder))
-    except Exception as error:  # whatever it is, the others are told
-        check("the test comes to its end", False, repr(error))
-    signal.alarm(0)
-print("all is well" if not failed else f"{failed} failed", flush=True)
-sys.exit(1 if failed else 0)
+# The folder is also where Rerun keeps its settings.
+finish(shown, "rerun", XDG_RUNTIME_DIR=None, XDG_CONFIG_HOME=None, XDG_DATA_HOME=None, XDG_CACHE_HOME=None)
