@@ -76,6 +76,7 @@ CONTENTS = {
         ],
         "Reference": [
             ("Pipelines and tools", "/pipelines/README"),
+            ("Viewers", "/pipelines/viewers/README"),
             ("Changes", "/CHANGELOG"),
             ("Security", "/SECURITY"),
         ],
