@@ -100,9 +100,11 @@ impl RunSummary {
     /// Checks that a run that merges maps had any.
     pub(crate) fn check_for_maps(&self) -> Result<()> {
         if self.merge.as_ref().is_some_and(|merge| merge.frames.is_empty() && merge.unmerged.is_empty()) {
+            // What was found comes first: the advice is for logs in which nothing was.
             bail!(
-                "the input has no usable map: a nav_msgs/msg/OccupancyGrid is needed for each robot, by default on /ROBOT/map; \
-                 `gridweave info LOG` lists the topics, and [robots] in the pipeline file names those that are read{}",
+                "the input has no usable map{}\n\
+                 a nav_msgs/msg/OccupancyGrid is needed for each robot, by default on /ROBOT/map; `gridweave info LOG` lists the \
+                 topics, and [robots] in the pipeline file names those that are read",
                 self.warnings().map(|(_, what, _)| format!("\n  {what}")).collect::<String>()
             );
         }

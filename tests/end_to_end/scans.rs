@@ -158,3 +158,24 @@ fn robots_whose_odometry_drifts_are_merged() {
     merge(folder).assert(0, &["maps are built from scans", "merged 2 of 2"]);
     assert_eq!(judged(folder), [1, 0].map(Value::from));
 }
+
+/// The lidar of robot2 sees too little to find its way.
+#[test]
+fn a_robot_that_loses_its_way_is_not_merged_and_the_reason_is_said() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    for (robot, beams, range) in [("robot1", "beams=180", "lidar_range=12"), ("robot2", "beams=40", "lidar_range=0.8")]
+    {
+        let log = format!("{robot}.in.mcap");
+        let world =
+            ["--robots", "2", "--seed", "5", "--set", "scans=true", "--set", "odometry=true", "--set", "width=12"];
+        let lidar = ["--set", "height=10", "--set", "tags=0", "--set", beams, "--set", range];
+        simulate(folder, &log, &[&world[..], &lidar].concat());
+        let topics = format!("/{robot}/scan,/{robot}/odom");
+        let raw = ["filter", &log, "-o", &format!("{robot}.mcap"), "--topics", &topics];
+        gridweave(folder, &raw).assert(0, &[]);
+    }
+    let merge = |logs: &[&str]| gridweave(folder, &[&["merge"], logs, &["-o", "out.mcap"]].concat());
+    merge(&["robot1.mcap", "robot2.mcap"]).assert(3, &["not merged: robot2", "scans lie on none of its others"]);
+    merge(&["robot2.mcap"]).assert(1, &["no usable map", "no map of robot2", "scans lie on none of its others"]);
+}

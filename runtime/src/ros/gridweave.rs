@@ -256,4 +256,4 @@ impl RobotFrames {
     pub const WORLD: &'static str = "world";
 }
 
-ros_messages!("gridweave_msgs": RangeScan, Segments, MapDirection, Alignment, RobotFrames, Verdicts, Evidence, MapAgreement);
+ros_messages!("gridweave_msgs": RangeScan, Segments, MapDirection, Alignment, RobotFrames, Verdicts, Evidence, MapAgreement, UnmergedRobot);

@@ -5,7 +5,7 @@ use super::{MappingMode, ScanBeams, ScanMapperParameters};
 use crate::shared::geometry::Pose2;
 use crate::tags::tag_localizer::time_of;
 use gridweave_runtime::message::LogTime;
-use gridweave_runtime::ros::{Header, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, RangeScan};
+use gridweave_runtime::ros::{Header, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, RangeScan, UnmergedRobot};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -41,6 +41,7 @@ struct ScanMapper {
 struct Drawn {
     map: Out<OccupancyGrid<'static>>,
     pose: Out<PoseWithCovarianceStamped>,
+    lost: Out<UnmergedRobot>,
 }
 
 impl Outputs for Drawn {
@@ -52,6 +53,7 @@ impl Outputs for Drawn {
                 "pose",
                 "where robots with odometry only are in the maps that were drawn of their scans",
             ),
+            lost: ports.output_on("/{robot}/lost", "lost", "why a robot with scans has no map: it has lost its way"),
         }
     }
 }
@@ -182,13 +184,16 @@ impl ScanMapper {
         }
         robot.sent_until = Some(last);
         if let Some(lost) = robot.lost() {
-            output.warn(format!(
-                "no map of {name}: {} of {} scans lie on none of its others, the first of them {:.1} s after its first scan. Its \
-                 odometry or its scans may be wrong",
+            let reason = format!(
+                "{} of {} scans lie on none of its others, the first of them {:.1} s after its first scan. Its odometry or \
+                 its scans may be wrong",
                 lost.unmatched,
                 lost.scans,
                 lost.since.seconds_since(first)
-            ));
+            );
+            output.warn(format!("no map of {name}: {reason}"));
+            let reason = format!("it has no map: {reason}");
+            output.lost.send(name, &UnmergedRobot { robot: name.to_owned(), reason })?;
             return Ok(());
         }
         for (time, odometry) in robot.take_odometry() {

@@ -4,7 +4,9 @@ use super::kind;
 use super::test_drive::{BEAMS, CELL, TURN, at, scan, still_ranges, to_wall, truth};
 use crate::shared::geometry::{Grid, GridGeometry, Point2, Pose2, is_free, is_occupied, pose};
 use gridweave_runtime::message::Message;
-use gridweave_runtime::ros::{Header, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, RangeScan, RosMessage};
+use gridweave_runtime::ros::{
+    Header, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, RangeScan, RosMessage, UnmergedRobot,
+};
 use gridweave_runtime::stage::StageHarness;
 
 struct Bench(StageHarness);
@@ -304,6 +306,8 @@ fn scans_that_lie_on_no_others_give_a_warning_and_no_map() {
     let warnings = bench.0.warnings();
     let is_lost = |text: &String| text.starts_with("no map of robot1") && text.contains("1.0 s after its first scan");
     assert!(warnings.keys().any(is_lost), "{warnings:?}");
+    let lost: Vec<UnmergedRobot> = bench.0.take("lost").unwrap();
+    assert!(lost.len() == 1 && lost[0].robot == "robot1" && lost[0].reason.starts_with("it has no map: "), "{lost:?}");
 }
 
 #[test]

@@ -5,7 +5,9 @@ use super::messages::{hold, is_same, prefixed, robot_frames, verdicts};
 use super::solution::{Alignments, Solution, by_name};
 use super::solve::solve;
 use super::tree::Tree;
-use gridweave_runtime::ros::{Alignment, GridError, Header, OccupancyGrid, RobotFrames, TFMessage, Verdict, Verdicts};
+use gridweave_runtime::ros::{
+    Alignment, GridError, Header, OccupancyGrid, RobotFrames, TFMessage, UnmergedRobot, Verdict, Verdicts,
+};
 use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,6 +27,7 @@ pub fn kind() -> StageKind {
          alignments name",
         FrameSolver::receive_map,
     )
+    .optional_input("lost", "robots that have no map, with the reason", FrameSolver::receive_lost)
     .input("alignment", "alignments of pairs, accepted and refused ones", FrameSolver::receive_alignment)
     .finish(FrameSolver::finish)
     .build()
@@ -74,6 +77,8 @@ struct FrameSolver {
     mapped: BTreeSet<String>,
     /// What is wrong with the maps of robots that have sent none that can be used.
     unusable_maps: BTreeMap<String, GridError>,
+    /// Why robots have no map.
+    lost: BTreeMap<String, String>,
     frame_ids: BTreeMap<String, String>,
     alignments: Alignments,
     reference: Option<String>,
@@ -93,6 +98,7 @@ impl FrameSolver {
             robots: BTreeSet::new(),
             mapped: BTreeSet::new(),
             unusable_maps: BTreeMap::new(),
+            lost: BTreeMap::new(),
             frame_ids: BTreeMap::new(),
             alignments: BTreeMap::new(),
             reference: None,
@@ -128,6 +134,17 @@ impl FrameSolver {
             Err(_) => false,
         };
         if is_new || is_renamed || has_changed { self.solve_and_send(output) } else { Ok(()) }
+    }
+
+    /// A robot without a map is known, and is not merged.
+    fn receive_lost(
+        &mut self,
+        lost: Received<'_, UnmergedRobot>,
+        output: &Output<Placement>,
+    ) -> Result<(), StageError> {
+        let UnmergedRobot { robot, reason } = lost.into_content();
+        let before = self.lost.insert(robot, reason.clone());
+        if before == Some(reason) { Ok(()) } else { self.solve_and_send(output) }
     }
 
     /// An alignment changes the solution if it differs from the last one of its pair.
@@ -176,7 +193,10 @@ impl FrameSolver {
         };
         self.is_settled |= is_settled;
         if let Some(reference) = &self.reference {
+            // A robot that had a map before it lost its way keeps its place.
+            let lost = self.lost.iter().filter(|(robot, _)| !self.robots.contains(*robot));
             self.solution = solve(&self.robots, &self.alignments, reference, &self.parameters, &self.solution);
+            self.solution.unmerged.extend(lost.map(|(robot, reason)| (robot.clone(), reason.clone())));
             for (robot, error) in &self.unusable_maps {
                 if let Some(reason) = self.solution.unmerged.get_mut(robot) {
                     *reason = format!("its map cannot be used: {error}");

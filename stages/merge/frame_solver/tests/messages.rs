@@ -132,6 +132,21 @@ fn a_robot_whose_map_cannot_be_used_is_no_reference_and_has_that_as_reason() {
 }
 
 #[test]
+fn a_robot_that_has_lost_its_way_is_not_merged_and_is_no_reference() {
+    let mut run = Run::new(None);
+    run.lost("robot1", "it has no map: its scans do not fit");
+    assert!(run.latest().is_none(), "nobody has a map");
+    run.map("robot2", "map");
+    assert_eq!(run.latest().unwrap().reference, "robot2");
+    assert_eq!(run.reason("robot1"), "it has no map: its scans do not fit");
+    // One that had a map before keeps its place.
+    run.map("robot3", "map");
+    run.align(&between(2, 3));
+    run.lost("robot3", "it has no map: its scans do not fit");
+    assert!(run.pose_of("robot3").is_some() && run.pose_of("robot1").is_none());
+}
+
+#[test]
 fn the_most_informative_refusal_is_the_reason() {
     let mut run = Run::new(None);
     run.align(&between(1, 2));

@@ -8,7 +8,7 @@ use super::kind;
 use crate::shared::geometry::{Pose2, pose, wrap_angle};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{
-    Alignment, Header, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames, TFMessage, Verdict, Verdicts,
+    Alignment, Header, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames, TFMessage, UnmergedRobot, Verdict, Verdicts,
 };
 use gridweave_runtime::stage::{Context, StageError, StageHarness};
 
@@ -34,6 +34,11 @@ impl Run {
         let info = MapMetaData { resolution, ..Default::default() };
         let map = OccupancyGrid { header: Header::new(LogTime(5), frame_id), info, ..Default::default() };
         self.stage.give::<OccupancyGrid<'_>>("map", robot, LogTime(5), &map).unwrap();
+    }
+
+    fn lost(&mut self, robot: &str, reason: &str) {
+        let lost = UnmergedRobot { robot: robot.to_owned(), reason: reason.to_owned() };
+        self.stage.give::<UnmergedRobot>("lost", robot, LogTime(5), &lost).unwrap();
     }
 
     fn align(&mut self, alignment: &Alignment) {
