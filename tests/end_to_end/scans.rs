@@ -142,6 +142,8 @@ fn robots_with_scans_and_odometry_alone_are_merged() {
     for wrong in ["0,0", "0,0,nan", "0,0,0,0", "ahead"] {
         lidar(wrong).assert(2, &["--lidar robot1=", "write ROBOT=X,Y,YAW"]);
     }
+    gridweave(folder, &["merge", "scans.mcap", "-o", "out.mcap", "--lidar", "robot9=0,0,0"])
+        .assert(1, &["`lidars` names `robot9`", "robot1, robot2"]);
 }
 
 /// Odometry as bad as that of public logs: the maps are built by SLAM, and merged.

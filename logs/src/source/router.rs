@@ -52,6 +52,11 @@ impl Router {
         }
     }
 
+    /// Robots with scans and without maps, sorted by name.
+    pub(crate) fn scanned(&self) -> impl Iterator<Item = &str> {
+        self.channels.roles().scanned()
+    }
+
     /// Sends a message. The output's log time must be the message's.
     pub(crate) fn send(&mut self, message: &LogMessage<'_>, output: &Output<RobotMessages>) -> Result<(), StageError> {
         let Some(route) = self.route(message, output)? else { return Ok(()) };

@@ -47,9 +47,20 @@ impl McapSource {
         let names_robots = rules.convention == Convention::ByRobot;
         // What keeps the names of the log keeps its bytes.
         let map_values = if names_robots { parameters.map_values } else { CellValues::Occupancy };
+        let given: Vec<String> = parameters.lidars.keys().cloned().collect();
         let reading = RobotReading { map_values, lidars: parameters.lidars };
+        let router = Router::new(context.robots.clone(), names, reader.files().clone(), names_robots, reading);
+        if let Some(robot) = given.iter().find(|robot| !router.scanned().any(|scanned| scanned == *robot)) {
+            let scanned: Vec<&str> = router.scanned().collect();
+            let help = match scanned.is_empty() {
+                true => "no map is built from scans in these logs".to_owned(),
+                false => format!("maps are built from the scans of {}", scanned.join(", ")),
+            };
+            let error = format!("`lidars` names `{robot}`, of whose scans no map is built");
+            return Err(StageError::new(doing, error).with_help(help));
+        }
         Ok(Self {
-            router: Router::new(context.robots.clone(), names, reader.files().clone(), names_robots, reading),
+            router,
             reader,
             window: Window::new(origin, parameters.start, parameters.end),
             latched: Some(LatchedMessages::default()),
