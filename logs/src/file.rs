@@ -55,12 +55,13 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Checks that a file can be written at `path`. Changes nothing, except that the part of a killed writer is removed.
+/// Checks that a file can be written at `path`. Changes nothing, except that the part of a killed writer is removed, with a warning.
 ///
 /// # Errors
 /// It cannot be written.
 pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     if let Some(mut left) = OutputFile::of_killed(path)? {
+        warn_of_removal(&left.file, &left.part);
         left.keep(false);
     }
     let folder = resolve(path).and_then(|place| Ok(access(folder_of(&place), Access::WRITE_OK | Access::EXEC_OK)?));
@@ -116,7 +117,10 @@ impl OutputFile {
                 // Another writer has renamed or removed it before it was locked here.
                 false => {}
                 true if is_made => return Ok(Self { path: path.to_owned(), place, part, file, is_kept: false }),
-                true => fs::remove_file(&part).map_err(of_path)?,
+                true => {
+                    warn_of_removal(&file, &part);
+                    fs::remove_file(&part).map_err(of_path)?;
+                }
             }
         }
     }
@@ -195,6 +199,18 @@ impl Drop for OutputFile {
         if !self.is_kept {
             let _ = fs::remove_file(&self.part);
         }
+    }
+}
+
+/// Warns that the part of a killed writer is removed, as it may hold a log of which there is nothing else.
+fn warn_of_removal(file: &File, part: &Path) {
+    let bytes = file.metadata().map_or(0, |metadata| metadata.len());
+    if bytes > 0 {
+        tracing::warn!(
+            "removed {} ({bytes} bytes), which a program that was killed has left; `gridweave recover` can read such a log \
+             before its name is used again",
+            part.display()
+        );
     }
 }
 

@@ -79,6 +79,22 @@ fn a_run_that_fails_leaves_the_earlier_output_in_its_place() {
 }
 
 #[test]
+fn a_run_that_removes_the_part_of_one_that_was_killed_says_so() {
+    for engine in ["single", "processes"] {
+        let folder = folder();
+        let part = part(&folder.path().join(OUTPUT));
+        fs::write(folder.path().join("gate_2000"), b"").unwrap();
+        // Nobody has it locked.
+        fs::write(&part, "what was written").unwrap();
+        let ended = run(folder.path(), engine).wait();
+        ended.assert(0, &["removed ", "out.mcap.part (16 bytes)", "`gridweave recover`"]);
+        assert_eq!(ended.text().matches("was killed").count(), 1, "{ended:#?}");
+        let ended = run(folder.path(), engine).wait();
+        assert!(!ended.text().contains("was killed") && !part.exists(), "{ended:#?}");
+    }
+}
+
+#[test]
 fn outputs_that_are_one_file_by_another_name_are_refused() {
     let folder = folder();
     fs::create_dir(folder.path().join("sub")).unwrap();
