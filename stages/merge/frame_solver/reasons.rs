@@ -3,6 +3,7 @@
 use super::UncertainPose;
 use super::solution::{Alignments, OpenCycle, Solution};
 use crate::shared::robot_pair::RobotPair;
+use gridweave_runtime::ros::Alignment;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Reason of an alignment that the others show to be wrong.
@@ -31,28 +32,45 @@ pub(super) fn unmerged(
     robots: &BTreeSet<String>,
     solution: &Solution,
     alignments: &Alignments,
-    disputed: &BTreeMap<String, String>,
 ) -> BTreeMap<String, String> {
-    let Solution { frames, groups, left_out, .. } = solution;
-    let outside: BTreeSet<&str> =
-        robots.iter().filter(|robot| !frames.contains_key(*robot)).map(String::as_str).collect();
-    let refusals = UnusedAlignments::new(&outside, alignments, left_out);
-    let reason = |robot: &str| {
-        if let Some(reason) = disputed.get(robot) {
-            return reason.clone();
-        }
-        let Some(group) = groups.iter().find(|group| group.frames.contains_key(robot)) else {
-            return no_alignment(robot, frames, &refusals);
-        };
-        let others: Vec<String> = group.frames.keys().filter(|other| *other != robot).cloned().collect();
-        // The alignment that keeps the group apart may be one of another member only.
-        let members = std::iter::once(robot).chain(others.iter().map(String::as_str));
-        let known = members.clone().find_map(|member| disputed.get(member).cloned());
-        let refused = || members.clone().find_map(|member| refusals.most_informative(member, frames));
-        let why = known.or_else(refused).unwrap_or_else(|| "no alignment connects them with a merged robot".into());
-        format!("it is connected with {} only, not with the reference: {why}", list(&others))
+    let outside = || robots.iter().filter(|robot| !solution.frames.contains_key(*robot)).map(String::as_str);
+    let refusals = UnusedAlignments::new(&outside().collect(), alignments.iter(), &solution.left_out);
+    outside().map(|robot| (robot.to_owned(), reason(robot, solution, &refusals))).collect()
+}
+
+/// The same for the robots that an alignment of `pair` concerns: those of the pair, and those connected with them. The work goes
+/// with their alignments, not with those of all robots.
+pub(super) fn of_pair(
+    pair: &RobotPair,
+    robots: &BTreeSet<String>,
+    solution: &Solution,
+    alignments: &Alignments,
+) -> BTreeMap<String, String> {
+    let group = |robot: &str| solution.groups.iter().find(|group| group.frames.contains_key(robot));
+    let members = pair.robots().into_iter().filter_map(group).flat_map(|group| group.frames.keys().map(String::as_str));
+    let outside = pair.robots().into_iter().filter(|robot| !solution.frames.contains_key(*robot));
+    let concerned: BTreeSet<&str> = outside.chain(members).collect();
+    let pairs = concerned.iter().flat_map(|robot| robots.iter().map(|other| RobotPair::by_name(*robot, other)));
+    let theirs: BTreeMap<&RobotPair, &Alignment> = pairs.filter_map(|pair| alignments.get_key_value(&pair)).collect();
+    let refusals = UnusedAlignments::new(&concerned, theirs, &solution.left_out);
+    concerned.iter().map(|robot| ((*robot).to_owned(), reason(robot, solution, &refusals))).collect()
+}
+
+fn reason(robot: &str, solution: &Solution, refusals: &UnusedAlignments<'_>) -> String {
+    let Solution { frames, groups, disputed, .. } = solution;
+    if let Some(reason) = disputed.get(robot) {
+        return reason.clone();
+    }
+    let Some(group) = groups.iter().find(|group| group.frames.contains_key(robot)) else {
+        return no_alignment(robot, frames, refusals);
     };
-    outside.iter().map(|robot| ((*robot).to_owned(), reason(robot))).collect()
+    let others: Vec<String> = group.frames.keys().filter(|other| *other != robot).cloned().collect();
+    // The alignment that keeps the group apart may be one of another member only.
+    let members = std::iter::once(robot).chain(others.iter().map(String::as_str));
+    let known = members.clone().find_map(|member| disputed.get(member).cloned());
+    let refused = || members.clone().find_map(|member| refusals.most_informative(member, frames));
+    let why = known.or_else(refused).unwrap_or_else(|| "no alignment connects them with a merged robot".into());
+    format!("it is connected with {} only, not with the reference: {why}", list(&others))
 }
 
 fn no_alignment(robot: &str, frames: &BTreeMap<String, UncertainPose>, refusals: &UnusedAlignments<'_>) -> String {
@@ -69,11 +87,15 @@ struct UnusedAlignment<'a> {
     reason: &'a str,
 }
 
-/// For every robot outside, its alignments that were not used. Gathered once: there are as many as pairs of robots.
+/// For robots outside, their alignments that were not used. Gathered once: there are as many as pairs of robots.
 struct UnusedAlignments<'a>(BTreeMap<&'a str, Vec<UnusedAlignment<'a>>>);
 
 impl<'a> UnusedAlignments<'a> {
-    fn new(outside: &BTreeSet<&'a str>, alignments: &'a Alignments, left_out: &'a BTreeMap<RobotPair, String>) -> Self {
+    fn new(
+        outside: &BTreeSet<&'a str>,
+        alignments: impl IntoIterator<Item = (&'a RobotPair, &'a Alignment)>,
+        left_out: &'a BTreeMap<RobotPair, String>,
+    ) -> Self {
         let mut by_robot: BTreeMap<&str, Vec<UnusedAlignment<'_>>> =
             outside.iter().map(|robot| (*robot, Vec::new())).collect();
         for (pair, alignment) in alignments {

@@ -18,6 +18,8 @@ pub struct Solution {
     pub unmerged: BTreeMap<String, String>,
     /// Those of them that are connected with each other, by the name of the group's reference.
     pub groups: Vec<Group>,
+    /// Robots whose alignments contradict each other, with the reason.
+    pub disputed: BTreeMap<String, String>,
     /// Alignments that their stage accepted and that were left out here, with the reason.
     pub left_out: BTreeMap<RobotPair, String>,
     /// The others, `T_a_b` with the floors added to the covariance, from which the frames were solved.

@@ -86,8 +86,8 @@ pub fn solve(
         }
     }
     groups.sort_by(|one, other| one.reference.cmp(&other.reference));
-    let mut solution = Solution { frames, groups, left_out, used, ..Solution::default() };
-    solution.unmerged = reasons::unmerged(robots, &solution, alignments, &disputed);
+    let mut solution = Solution { frames, groups, disputed, left_out, used, ..Solution::default() };
+    solution.unmerged = reasons::unmerged(robots, &solution, alignments);
     solution
 }
 

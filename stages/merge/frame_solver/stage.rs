@@ -2,9 +2,11 @@
 
 use super::FrameSolverParameters;
 use super::messages::{hold, is_same, prefixed, robot_frames, verdicts};
+use super::reasons;
 use super::solution::{Alignments, Solution, by_name};
 use super::solve::solve;
 use super::tree::Tree;
+use crate::shared::robot_pair::RobotPair;
 use gridweave_runtime::ros::{
     Alignment, GridError, Header, OccupancyGrid, RobotFrames, TFMessage, UnmergedRobot, Verdict, Verdicts,
 };
@@ -158,10 +160,37 @@ impl FrameSolver {
             return Ok(());
         };
         alignment.header = Header::default();
-        self.robots.insert(pair.a.clone());
-        self.robots.insert(pair.b.clone());
+        let are_known = pair.robots().iter().all(|robot| self.robots.contains(*robot));
+        self.robots.extend(pair.robots().map(str::to_owned));
+        let is_refused = !alignment.accepted;
         let before = self.alignments.insert(pair.clone(), alignment);
-        if before.as_ref() == self.alignments.get(&pair) { Ok(()) } else { self.solve_and_send(output) }
+        if before.as_ref() == self.alignments.get(&pair) {
+            return Ok(());
+        }
+        match are_known && is_refused && before.is_none_or(|before| !before.accepted) {
+            true => self.explain_and_send(&pair, output),
+            false => self.solve_and_send(output),
+        }
+    }
+
+    /// An alignment that is refused, and was not accepted before, moves no robot: only the reasons of its own change.
+    fn explain_and_send(&mut self, pair: &RobotPair, output: &Output<Placement>) -> Result<(), StageError> {
+        if self.reference.is_none() {
+            return self.solve_and_send(output);
+        }
+        let reasons = reasons::of_pair(pair, &self.robots, &self.solution, &self.alignments);
+        self.solution.unmerged.extend(reasons);
+        self.explain_maps();
+        self.send_all(output)
+    }
+
+    /// Where a map cannot be used, that is why its robot is not merged.
+    fn explain_maps(&mut self) {
+        for (robot, error) in &self.unusable_maps {
+            if let Some(reason) = self.solution.unmerged.get_mut(robot) {
+                *reason = format!("its map cannot be used: {error}");
+            }
+        }
     }
 
     fn finish(&mut self, output: &Output<Placement>) -> Result<(), StageError> {
@@ -197,12 +226,12 @@ impl FrameSolver {
             let lost = self.lost.iter().filter(|(robot, _)| !self.robots.contains(*robot));
             self.solution = solve(&self.robots, &self.alignments, reference, &self.parameters, &self.solution);
             self.solution.unmerged.extend(lost.map(|(robot, reason)| (robot.clone(), reason.clone())));
-            for (robot, error) in &self.unusable_maps {
-                if let Some(reason) = self.solution.unmerged.get_mut(robot) {
-                    *reason = format!("its map cannot be used: {error}");
-                }
-            }
+            self.explain_maps();
         }
+        self.send_all(output)
+    }
+
+    fn send_all(&mut self, output: &Output<Placement>) -> Result<(), StageError> {
         match self.send(output, false)? {
             true => self.send_verdicts(output),
             false => Ok(()),

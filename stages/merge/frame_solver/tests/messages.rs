@@ -256,3 +256,31 @@ fn a_reference_stays_when_an_earlier_name_appears_after_a_merge() {
     run.align(&refused("robot1", "robot2", 0.1, "the larger maps disagree"));
     assert_eq!(run.latest().unwrap().reference, "robot2");
 }
+
+#[test]
+fn reasons_are_the_same_whether_robots_are_solved_before_or_after_refusals() {
+    let connected = [between(1, 2), between(3, 4)];
+    let refusals = [
+        refused("robot1", "robot3", 0.3, "too few tags"),
+        refused("robot4", "robot2", 0.5, "walls do not fit"),
+        refused("robot5", "robot1", 0.1, "nothing in common"),
+        refused("robot3", "robot5", 0.9, "walls do not fit"),
+        refused("robot6", "robot1", 0.2, "no walls"),
+        // The last one of a pair counts.
+        refused("robot4", "robot2", 0.2, "nothing in common"),
+        refused("robot5", "robot2", 0.1, "nothing in common"),
+    ];
+    let solve = |alignments: [&[Alignment]; 2]| {
+        let mut run = Run::new(None);
+        (1..=5).for_each(|robot| run.map(&format!("robot{robot}"), "map"));
+        run.map_of_resolution("robot6", "map", 0.0);
+        alignments.into_iter().flatten().for_each(|alignment| run.align(alignment));
+        run.solved()
+    };
+    let (before, after) = (solve([&connected, &refusals]), solve([&refusals, &connected]));
+    assert_eq!(before.unmerged, after.unmerged);
+    let reason = |robot: &str| before.unmerged.iter().find(|unmerged| unmerged.robot == robot).unwrap().reason.clone();
+    assert!(reason("robot3").contains("robot4 only") && reason("robot3").contains("too few tags"), "{before:#?}");
+    assert!(reason("robot5").contains("robot1 and robot2: nothing in common"), "{before:#?}");
+    assert!(reason("robot6").contains("cannot be used"), "{before:#?}");
+}
