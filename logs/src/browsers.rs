@@ -186,7 +186,7 @@ impl Connection {
     /// browser has sent already.
     ///
     /// # Errors
-    /// The server cannot be reached.
+    /// The server cannot be reached, or a thread cannot be started.
     pub fn relay(self, server: SocketAddr, first: &[u8]) -> io::Result<()> {
         let mut server = TcpStream::connect(server)?;
         server.write_all(first)?;
@@ -202,10 +202,10 @@ impl Connection {
             let _ = to.shutdown(Shutdown::Both);
         };
         thread::scope(|scope| {
-            scope.spawn(|| pass(browser, &server));
+            thread::Builder::new().spawn_scoped(scope, || pass(browser, &server))?;
             pass(&server, browser);
-        });
-        Ok(())
+            Ok(())
+        })
     }
 
     /// Refuses the connection without waiting for anything.

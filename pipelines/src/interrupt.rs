@@ -33,12 +33,15 @@ pub(crate) fn stop_on_interrupt(what_follows: &'static str) -> &'static AtomicBo
         if let Err(error) = ctrlc::set_handler(move || interrupt(what_follows)) {
             tracing::warn!("an interrupt will end the program without closing the output: {error}");
         }
-        thread::spawn(move || {
+        let wait = move || {
             let signals: SigSet = OTHERS.into_iter().collect();
             while signals.wait().is_ok() {
                 interrupt(what_follows);
             }
-        });
+        };
+        if let Err(error) = thread::Builder::new().name("signals".to_owned()).spawn(wait) {
+            tracing::warn!("some signals will not end the program: {error}");
+        }
     }
     &INTERRUPTED
 }

@@ -5,6 +5,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
+mod address_space;
 mod bad_input;
 mod changing_maps;
 mod closed_output;

@@ -27,7 +27,7 @@ pub(super) struct Statistics {
 }
 
 impl Statistics {
-    /// Starts publishing; does nothing if the engine has no statistics.
+    /// Starts publishing; does nothing if the engine has no statistics, or a thread cannot be started.
     pub(super) fn start(
         run: Option<RunStatistics>,
         context: &Arc<foxglove::Context>,
@@ -36,7 +36,7 @@ impl Statistics {
         let log_time = Arc::new(AtomicU64::new(0));
         let schema = Schema::new(SCHEMA_NAME, "jsonschema", SCHEMA.as_bytes());
         let raw = ChannelBuilder::new(TOPIC).message_encoding("json").schema(schema).context(context).build_raw().ok();
-        let thread = run.zip(raw).map(|(run, raw)| {
+        let thread = run.zip(raw).and_then(|(run, raw)| {
             let (stop, stopped) = channel();
             let seen = Arc::clone(&log_time);
             let publish = move || {
@@ -48,7 +48,7 @@ impl Statistics {
                     }
                 }
             };
-            (stop, std::thread::spawn(publish))
+            Some((stop, std::thread::Builder::new().spawn(publish).ok()?))
         });
         Self { log_time, thread }
     }

@@ -41,7 +41,7 @@ pub(super) fn run_record(pipeline: &str) -> BTreeMap<String, String> {
 
 /// The hashes of a run's input files, computed in a thread during the run.
 pub(super) struct InputHashes {
-    worker: JoinHandle<Vec<InputFile>>,
+    worker: io::Result<JoinHandle<Vec<InputFile>>>,
     stop: Arc<AtomicBool>,
 }
 
@@ -51,14 +51,14 @@ impl InputHashes {
         let stop = Arc::new(AtomicBool::new(false));
         let is_stopped = Arc::clone(&stop);
         // Unreadable files are reported by the stage that reads them.
-        let worker =
-            thread::spawn(move || named_files(&typed).filter_map(|file| hash(file, &is_stopped).ok()).collect());
+        let work = move || named_files(&typed).filter_map(|file| hash(file, &is_stopped).ok()).collect();
+        let worker = thread::Builder::new().name("hashes".to_owned()).spawn(work);
         Self { worker, stop }
     }
 
-    /// The entries of [`INPUTS_RECORD`]. Waits until all are known.
+    /// The entries of [`INPUTS_RECORD`]; none if the thread could not be started. Waits until all are known.
     pub(super) fn record(self) -> BTreeMap<String, String> {
-        let files = self.worker.join().unwrap_or_default();
+        let files = self.worker.ok().and_then(|worker| worker.join().ok()).unwrap_or_default();
         let digits = files.len().to_string().len();
         let entry = |(index, file): (usize, &InputFile)| {
             let number = index + 1;
@@ -70,7 +70,7 @@ impl InputHashes {
     /// Stops the computation.
     pub(super) fn stop(self) {
         self.stop.store(true, Ordering::Relaxed);
-        drop(self.worker.join());
+        drop(self.worker.map(JoinHandle::join));
     }
 }
 

@@ -69,8 +69,23 @@ pub enum Failure {
         /// The stages that have not ended, with the numbers of their pending messages.
         stages: Vec<String>,
     },
+    /// The engine reserves more address space than the program may have.
+    #[error(
+        "needs at least {} MB of address space with the engine `{engine}`, which reserves far more than it uses, and this program \
+         may have {} MB (`ulimit -v`): raise that limit, or use `--engine single`",
+        needed >> 20,
+        limit >> 20
+    )]
+    AddressSpace {
+        /// The name of the engine.
+        engine: String,
+        /// The address space that it needs at least, bytes.
+        needed: u64,
+        /// The limit, bytes.
+        limit: u64,
+    },
     /// A process or thread could not be started, or the folder of the run could not be used.
-    #[error("cannot run in processes: {0}")]
+    #[error("could not be started: {0}")]
     Process(String),
     /// The request of a program outside of the run is impossible.
     #[error("{0}")]

@@ -2,6 +2,7 @@
 //!
 //! Every engine delivers the same inputs in the same order to each stage, so every engine produces the same result.
 
+mod address_space;
 mod error;
 mod external_sender;
 mod links;
@@ -116,6 +117,9 @@ pub fn run(pipeline: &Pipeline, engine: EngineKind, observer: &dyn Observer) -> 
     if pipeline.mode == Mode::Live && engine != EngineKind::Processes {
         let text = format!("the pipeline is live, and the engine `{engine}` is for replays only: use `processes`");
         return Err(RunError::of_run(Failure::Process(text)));
+    }
+    if engine != EngineKind::Processes {
+        address_space::check(engine, pipeline).map_err(RunError::of_run)?;
     }
     match engine {
         EngineKind::Single => single::run(pipeline, observer),

@@ -61,6 +61,20 @@ pub enum LinkError {
         /// What was being done.
         doing: String,
     },
+    /// An operation of iceoryx2 failed, and the address space of this program is limited.
+    #[error(
+        "cannot {doing}: iceoryx2 says {cause}; the address space of this program is limited to {} MB (`ulimit -v`), and shared \
+         memory reserves far more than it uses: raise that limit, or use `--engine single`",
+        limit >> 20
+    )]
+    AddressSpace {
+        /// What was being done.
+        doing: String,
+        /// The error of iceoryx2.
+        cause: String,
+        /// The limit, bytes.
+        limit: u64,
+    },
     /// The link has the maximum number of external senders, or of observers.
     #[error("cannot {doing} {link}: {most} programs, the maximum, do so already; stop one of them")]
     Crowded {
@@ -100,9 +114,15 @@ impl LinkError {
     /// An error of iceoryx2 while `doing` something.
     pub(crate) fn shared(doing: impl Into<String>) -> impl FnOnce(&dyn fmt::Debug) -> Self {
         let doing = doing.into();
-        move |cause| match are_files_used_up() {
-            true => Self::Files { doing },
-            false => Self::Shared { doing, cause: format!("{cause:?}") },
+        move |cause| {
+            if are_files_used_up() {
+                return Self::Files { doing };
+            }
+            let cause = format!("{cause:?}");
+            match getrlimit(Resource::As).current {
+                Some(limit) => Self::AddressSpace { doing, cause, limit },
+                None => Self::Shared { doing, cause },
+            }
         }
     }
 }

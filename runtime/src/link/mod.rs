@@ -72,6 +72,8 @@ mod service;
 mod shared_memory;
 mod sleeper;
 mod stage_counters;
+#[cfg(test)]
+mod unmapped_sample_test;
 
 pub use counters::{MAX_SENDERS, SharedCounters, monotonic_nanoseconds};
 pub use error::LinkError;

@@ -125,8 +125,14 @@ impl<S: Service + 'static> LinkReceiver<S> {
     pub(crate) fn receive(&mut self, queue: &mut InputQueue) -> Result<(), LinkError> {
         self.connect()?;
         while self.order == Order::LogTime || queue.is_empty() {
+            let has_sample = self.order == Order::LogTime && self.has_samples()?;
             match self.subscriber.receive().map_err(|e| self.failed("receive from", &e))? {
                 Some(sample) => self.take_sample(sample, queue)?,
+                // iceoryx2 discards a sample whose memory it cannot map, and reports none. In a replay the sender would wait
+                // for it without end; in a live run its sender may be gone, and the gap in the numbers is counted.
+                None if has_sample => {
+                    return Err(self.failed("receive from", &format_args!("that a sample cannot be mapped")));
+                }
                 None if !self.repeats.is_empty() => {
                     for (header, storage) in self.repeats.take_all() {
                         self.ingest(&header, storage, queue)?;
@@ -178,8 +184,11 @@ impl<S: Service + 'static> LinkReceiver<S> {
         if self.senders != self.owner.counters.senders(self.owner.port) || !self.repeats.is_empty() {
             return Ok(true);
         }
-        let has_samples = self.subscriber.has_samples().map_err(|e| self.failed("receive from", &e))?;
-        Ok(has_samples || self.is_at_end() && !queue.has_ended())
+        Ok(self.has_samples()? || self.is_at_end() && !queue.has_ended())
+    }
+
+    fn has_samples(&self) -> Result<bool, LinkError> {
+        self.subscriber.has_samples().map_err(|e| self.failed("receive from", &e))
     }
 
     /// Connects to senders that have joined, and frees the windows of those that have left.

@@ -11,6 +11,7 @@ use gridweave_runtime::engine::{ExternalSender, SenderStopper};
 use gridweave_runtime::message::{LogTime, MessageFlags, MessageHeader, Write};
 use gridweave_runtime::stage::{Context, Node, OutputEnd, OutputSink, PortType, Registry, StageError};
 use std::cell::RefCell;
+use std::io;
 use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -73,6 +74,7 @@ pub(crate) fn play(args: &PlayArgs, registry: &Registry) -> Result<Status> {
     let pace = Rc::new(RefCell::new(Pace::new(args.rate)));
     let links = || player.links(&running, stage, &sender, &pace);
     let result = watch_while(&is_over, &stopped, &sender.stopper(), || player.play_all(&links, &pace, &stopped));
+    let result = result.context("cannot start a thread")?;
     let messages = pace.borrow().messages;
     match result {
         Err(_) if stopped.load(Ordering::Relaxed) => {}
@@ -109,15 +111,18 @@ fn external_stage(running: &Running, name: Option<&str>) -> Result<usize> {
 }
 
 /// Does some work while another thread waits for `is_over`, and then sets `stopped` and stops the input stream.
+///
+/// # Errors
+/// The thread cannot be started.
 fn watch_while<T>(
     is_over: &(impl Fn() -> bool + Sync),
     stopped: &AtomicBool,
     sender: &SenderStopper,
     work: impl FnOnce() -> T,
-) -> T {
+) -> io::Result<T> {
     let done = AtomicBool::new(false);
     thread::scope(|scope| {
-        scope.spawn(|| {
+        let watch = || {
             while !done.load(Ordering::Relaxed) {
                 if is_over() {
                     stopped.store(true, Ordering::Relaxed);
@@ -125,10 +130,11 @@ fn watch_while<T>(
                 }
                 thread::sleep(LOOK_INTERVAL);
             }
-        });
+        };
+        thread::Builder::new().spawn_scoped(scope, watch)?;
         let result = work();
         done.store(true, Ordering::Relaxed);
-        result
+        Ok(result)
     })
 }
 

@@ -48,8 +48,8 @@ pub fn run_process(
     let supervisor = Supervisor { output: &mut io::stdout(), last_report: Instant::now() };
     let counters = folder.counters(&pipeline).map_err(|error| error.to_string())?;
     let control = Arc::new(Control::default());
-    Process { pipeline: &pipeline, folder: &folder, stages: &stages, counters: &counters, control }.run(supervisor);
-    Ok(())
+    let process = Process { pipeline: &pipeline, folder: &folder, stages: &stages, counters: &counters, control };
+    process.run(supervisor).map_err(|error| format!("cannot start a thread: {error}"))
 }
 
 /// The connection to the supervisor: standard output, locked for a line at a time, as stages may print. A failure to write is
@@ -90,22 +90,28 @@ struct Process<'a> {
 }
 
 impl Process<'_> {
-    fn run(&self, mut supervisor: Supervisor<'_>) {
+    /// Fails if the thread that reads the commands cannot be started.
+    fn run(&self, mut supervisor: Supervisor<'_>) -> io::Result<()> {
         let names = self.folder.names();
         let observable = watch_links(&self.folder.as_running(), self.pipeline);
         let links = Links::new(self.pipeline, &names, self.counters).with_observable(observable);
         let stop_reason = OnceLock::new();
         let (sender, receiver) = channel();
-        read_commands(sender.clone());
+        read_commands(sender.clone())?;
         thread::scope(|scope| {
             for &stage in self.stages {
-                let (sender, links, stop_reason) = (sender.clone(), &links, &stop_reason);
+                let (events, links, stop_reason) = (sender.clone(), &links, &stop_reason);
                 let control = Arc::clone(&self.control);
-                scope.spawn(move || StageThread::<Service>::start(links, stage, control, stop_reason, &sender));
+                let work = move || StageThread::<Service>::start(links, stage, control, stop_reason, &events);
+                if let Err(error) = thread::Builder::new().spawn_scoped(scope, work) {
+                    let failure = Failure::Process(format!("cannot start a thread: {error}"));
+                    send_event(&sender, Event::Ended { stage, result: Err(failure) });
+                }
             }
             drop(sender);
             self.report(&mut supervisor, &receiver, &stop_reason);
         });
+        Ok(())
     }
 
     /// Reports the events of the stages to the supervisor until all have ended.
@@ -167,8 +173,8 @@ impl Process<'_> {
 }
 
 /// Reads the commands of the supervisor in a separate thread. The end of the supervisor is a reason to stop.
-fn read_commands(events: Sender<Event>) {
-    thread::spawn(move || {
+fn read_commands(events: Sender<Event>) -> io::Result<()> {
+    let read = move || {
         for line in io::stdin().lock().lines() {
             let Ok(line) = line else { break };
             let event = match serde_json::from_str(&line) {
@@ -183,5 +189,6 @@ fn read_commands(events: Sender<Event>) {
         drop(events);
         thread::sleep(ORPHAN_GRACE);
         std::process::exit(1);
-    });
+    };
+    thread::Builder::new().name("commands".to_owned()).spawn(read).map(drop)
 }

@@ -30,7 +30,7 @@ mod system;
 pub use child::run_process;
 pub use system::{describe_exit, memory_of_process};
 
-use super::{Observer, RunError, RunReport};
+use super::{EngineKind, Observer, RunError, RunReport, address_space};
 use crate::pipeline::Pipeline;
 use std::path::PathBuf;
 use std::sync::OnceLock;
@@ -77,5 +77,6 @@ impl Launch {
 
 /// Runs a pipeline to its end, with its stages in processes.
 pub fn run(pipeline: &Pipeline, launch: &Launch, observer: &dyn Observer) -> Result<RunReport, RunError> {
+    address_space::check(EngineKind::Processes, pipeline).map_err(RunError::of_run)?;
     supervisor::run(pipeline, launch, observer)
 }

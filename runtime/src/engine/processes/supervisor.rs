@@ -149,7 +149,14 @@ impl Supervisor<'_> {
             .map_err(|error| Failure::Process(format!("cannot start {}: {error}", self.launch.program.display())))?;
         if let Some(stdout) = child.stdout.take() {
             let events = self.events.clone();
-            self.readers.push(thread::spawn(move || read_reports(process, stdout, &events)));
+            match thread::Builder::new().spawn(move || read_reports(process, stdout, &events)) {
+                Ok(reader) => self.readers.push(reader),
+                Err(error) => {
+                    // Without a reader of its reports it ends by itself, too.
+                    let _ = child.kill().and_then(|()| child.wait());
+                    return Err(Failure::Process(format!("cannot start a thread: {error}")));
+                }
+            }
         }
         let stdin = child.stdin.take();
         Ok((child, stdin))

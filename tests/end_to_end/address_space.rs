@@ -1,0 +1,39 @@
+//! Too little address space (`ulimit -v`): a run that cannot keep the limit is refused, and what was there before stays.
+
+use crate::support::{Ended, LogBuilder, TestMap, gridweave_program, part, start_program};
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// Runs a merge of two rooms with so many kilobytes of address space.
+fn merge_within(folder: &Path, kilobytes: &str, engine: &str) -> Ended {
+    let mut log = LogBuilder::new(&folder.join("input.mcap"));
+    log.map(0.0, "robot1", &TestMap::room()).map(0.0, "robot2", &TestMap::room());
+    log.finish();
+    let limited = "ulimit -v \"$1\"; shift; exec \"$@\"";
+    let program = gridweave_program().to_str().unwrap();
+    let merge = ["merge", "input.mcap", "-o", "output.mcap", "--engine", engine];
+    let args = [&["-c", limited, "sh", kilobytes, program], &merge[..]].concat();
+    start_program("sh".as_ref(), folder, &args, &[]).wait()
+}
+
+#[test]
+fn a_run_of_threads_within_too_little_address_space_is_refused_and_says_what_to_do() {
+    let folder = TempDir::new().unwrap();
+    let output = folder.path().join("output.mcap");
+    fs::write(&output, "what was there before").unwrap();
+    for engine in ["threads", "threads-ipc", "processes"] {
+        let ended = merge_within(folder.path(), "700000", engine);
+        ended.assert(1, &["683 MB (`ulimit -v`)", "--engine single", engine]);
+        assert_eq!(fs::read_to_string(&output).unwrap(), "what was there before");
+        assert!(!part(&output).exists());
+    }
+}
+
+#[test]
+fn a_run_in_one_thread_warns_of_little_address_space() {
+    let folder = TempDir::new().unwrap();
+    let ended = merge_within(folder.path(), "500000", "single");
+    assert!([0, 3].contains(&ended.status), "{ended:#?}");
+    assert!(ended.stderr.contains("limited to 488 MB (`ulimit -v`)"), "{ended:#?}");
+}
