@@ -12,6 +12,7 @@ mod closed_output;
 mod compare;
 mod containers;
 mod engines_agree;
+mod failing_calls;
 mod failing_writes;
 mod far_from_the_origin;
 mod foxglove_view;
