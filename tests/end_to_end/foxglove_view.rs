@@ -1,7 +1,7 @@
 //! A live run is shown to the Foxglove app, and not slowed by it.
 
 use crate::python_libraries::{python, script};
-use crate::support::{LOG, RECEIVE, Run, gridweave};
+use crate::support::{LOG, RECEIVE, Run, gridweave, wait_until};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -41,7 +41,7 @@ fn a_port_that_the_system_chooses_is_told() {
 fn a_viewer_of_the_older_protocol_is_refused_and_the_needed_one_is_named() {
     let port = free_port();
     let run = Run::start(RECEIVE, &[&format!("--view={port}")]);
-    run.top();
+    wait_until("the server", || TcpStream::connect(("127.0.0.1", port)).is_ok());
     // Viewers try again.
     for _ in 0..2 {
         let mut viewer = TcpStream::connect(("127.0.0.1", port)).unwrap();
