@@ -5,6 +5,7 @@ mod bridge_settings;
 mod link_choice;
 mod message_printer;
 mod other_machines;
+mod pace;
 mod play;
 mod record;
 mod running;
