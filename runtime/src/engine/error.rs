@@ -72,7 +72,7 @@ pub enum Failure {
     /// The engine reserves more address space than the program may have.
     #[error(
         "needs at least {} MB of address space with the engine `{engine}`, which reserves far more than it uses, and this program \
-         may have {} MB (`ulimit -v`): raise that limit, or use `--engine single`",
+         may have {} MB (`ulimit -v`): raise that limit, or, for a replay, use `--engine single`",
         needed >> 20,
         limit >> 20
     )]

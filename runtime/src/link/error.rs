@@ -64,7 +64,7 @@ pub enum LinkError {
     /// An operation of iceoryx2 failed, and the address space of this program is limited.
     #[error(
         "cannot {doing}: iceoryx2 says {cause}; the address space of this program is limited to {} MB (`ulimit -v`), and shared \
-         memory reserves far more than it uses: raise that limit, or use `--engine single`",
+         memory reserves far more than it uses: raise that limit, or, for a replay, use `--engine single`",
         limit >> 20
     )]
     AddressSpace {
