@@ -62,14 +62,14 @@ impl NamedChannel {
     }
 
     /// Whether the channel has the transforms of all robots.
-    pub(super) fn is_shared_tf(&self) -> bool {
+    pub(crate) fn is_shared_tf(&self) -> bool {
         let is_of_a_robot = matches!(&self.frames, Frames::OfRobot { robot, .. } if !robot.is_empty());
         tf_topic(&self.channel) == Some("") && !is_of_a_robot
     }
 
     /// Puts the frames in the transforms of all robots under the robots that they belong to.
-    pub(super) fn share_frames(&mut self, shared: Arc<SharedFrames>) {
-        self.shared = Some(shared);
+    pub(crate) fn share_frames(&mut self, shared: Option<Arc<SharedFrames>>) {
+        self.shared = shared;
     }
 
     /// The new name of a frame in the channel's messages.

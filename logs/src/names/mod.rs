@@ -30,6 +30,7 @@ pub use input::Input;
 pub use rename::TopicRename;
 pub use rename_advice::rename_advice;
 pub use rules::{Convention, NameRules};
+pub(crate) use shared_frames::SharedFrames;
 
 use crate::reader::{LogFile, LogMessage, LogReader, log_files};
 use gridweave_runtime::message::Channel;

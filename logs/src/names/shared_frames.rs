@@ -18,7 +18,7 @@ const SEARCHED: usize = 20_000;
 
 /// What is known of the frames without a robot's name.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct SharedFrames {
+pub(crate) struct SharedFrames {
     /// The robots whose maps are logged in a frame, by this frame.
     of_map: BTreeMap<String, BTreeSet<String>>,
     /// The only robot whose map frame lacks its name; it has all frames below its map frame that lack one.
@@ -60,12 +60,13 @@ impl SharedFrames {
             read += 1;
             let key = (message.file, message.channel);
             if let Some(robot) = maps.get(&key).filter(|_| !found.contains_key(&key)) {
-                let frame = decode::<Header>(message.data).map(|header| plain(&header.frame_id).to_owned());
+                let frame = decode::<Header>(message.data).map(|header| Self::plain(&header.frame_id).to_owned());
                 found.insert(key, (robot.clone(), frame.unwrap_or_default()));
             } else if transforms.contains(&key)
                 && let Ok(message) = decode::<TFMessage>(message.data)
             {
-                let edge = |(parent, child): (&str, &str)| (plain(parent).to_owned(), plain(child).to_owned());
+                let edge =
+                    |(parent, child): (&str, &str)| (Self::plain(parent).to_owned(), Self::plain(child).to_owned());
                 let all = message.transforms.iter();
                 edges.extend(all.map(|one| edge((&one.header.frame_id, &one.child_frame_id))));
             }
@@ -73,8 +74,13 @@ impl SharedFrames {
         Self::of(found.into_values(), &edges)
     }
 
+    /// A frame without the slash that ROS 1 programs put before it.
+    pub(crate) fn plain(frame: &str) -> &str {
+        frame.trim_start_matches('/')
+    }
+
     /// What maps, each with its robot and frame, and transforms, parent and child, show.
-    fn of(maps: impl Iterator<Item = (String, String)>, edges: &BTreeSet<(String, String)>) -> Option<Self> {
+    pub(crate) fn of(maps: impl Iterator<Item = (String, String)>, edges: &BTreeSet<(String, String)>) -> Option<Self> {
         let mut shared = Self::default();
         for (robot, frame) in maps {
             let own = frame_of_robot(&robot, &frame);
@@ -113,15 +119,15 @@ impl SharedFrames {
 
     /// The names of the parent and the child of a transform.
     fn edge<'a>(&self, parent: &'a str, child: &'a str) -> (Cow<'a, str>, Cow<'a, str>) {
-        let (plain_parent, plain_child) = (plain(parent), plain(child));
+        let (plain_parent, plain_child) = (Self::plain(parent), Self::plain(child));
         if let Some(robot) = self.robot_of(plain_child) {
             let follows = self.of_map.get(plain_parent).is_some_and(|robots| robots.contains(robot));
             let parent = if follows { frame_of_robot(robot, plain_parent) } else { Cow::Borrowed(parent) };
             return (parent, Cow::Borrowed(child));
         }
         let own = |frame: &'a str| match &self.only {
-            Some(only) if self.robot_of(plain(frame)).is_none() && !self.above.contains(plain(frame)) => {
-                frame_of_robot(only, plain(frame))
+            Some(only) if self.robot_of(Self::plain(frame)).is_none() && !self.above.contains(Self::plain(frame)) => {
+                frame_of_robot(only, Self::plain(frame))
             }
             _ => Cow::Borrowed(frame),
         };
@@ -129,7 +135,7 @@ impl SharedFrames {
     }
 
     /// The message with the names of robots; `None` if it stays as it is.
-    pub(super) fn renamed(&self, message: &[u8]) -> Option<Vec<u8>> {
+    pub(crate) fn renamed(&self, message: &[u8]) -> Option<Vec<u8>> {
         let mut message: TFMessage = decode(message).ok()?;
         let mut is_renamed = false;
         for one in &mut message.transforms {
@@ -147,15 +153,10 @@ impl SharedFrames {
 impl Names {
     /// Finds out which frames in transforms of all robots follow the maps of robots, and renames them from now on.
     pub(super) fn share_frames(&mut self, files: &Arc<[LogFile]>, robots: &RobotTopics) {
-        let Some(shared) = SharedFrames::read(files, self, robots).map(Arc::new) else { return };
+        let shared = SharedFrames::read(files, self, robots).map(Arc::new);
         let all = self.channels.iter_mut().flat_map(BTreeMap::values_mut);
-        all.filter(|named| named.is_shared_tf()).for_each(|named| named.share_frames(Arc::clone(&shared)));
+        all.filter(|named| named.is_shared_tf()).for_each(|named| named.share_frames(shared.clone()));
     }
-}
-
-/// A frame without the slash that ROS 1 programs put before it.
-fn plain(frame: &str) -> &str {
-    frame.trim_start_matches('/')
 }
 
 #[cfg(test)]

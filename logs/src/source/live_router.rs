@@ -2,6 +2,7 @@
 
 use super::channel::Stamp;
 use super::channel_router::ChannelRouter;
+use super::live_frames::LiveFrames;
 use super::{RobotMessages, RobotReading};
 use crate::names::{NamedChannel, Renamed};
 use crate::robots::Role;
@@ -17,6 +18,7 @@ pub struct LiveRouter {
     also: Vec<String>,
     channels: Vec<LiveChannel>,
     router: ChannelRouter,
+    frames: LiveFrames,
     /// Buffer for a message whose frames were renamed.
     renamed: Vec<u8>,
 }
@@ -42,7 +44,13 @@ impl LiveRouter {
     /// Creates a router without channels. `robots` are the topic patterns; messages on the topics `also`, in which
     /// `{robot}` matches one part of the path, are passed on unchanged.
     pub fn new(robots: RobotTopics, also: Vec<String>, reading: RobotReading) -> Self {
-        Self { also, channels: Vec::new(), router: ChannelRouter::live(robots, reading), renamed: Vec::new() }
+        Self {
+            also,
+            channels: Vec::new(),
+            router: ChannelRouter::live(robots, reading),
+            frames: LiveFrames::default(),
+            renamed: Vec::new(),
+        }
     }
 
     /// Adds a channel. Returns its number, which is the same for equal channels. Adding a channel may change which
@@ -104,7 +112,11 @@ impl LiveRouter {
         message: LiveMessage<'_>,
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
-        let Some(channel) = self.channels.get(number).filter(|_| self.is_of_use(number)) else { return Ok(()) };
+        if !self.is_of_use(number) {
+            return Ok(());
+        }
+        self.learn_frames(number, message.data, output)?;
+        let Some(channel) = self.channels.get(number) else { return Ok(()) };
         let role = self.role(channel);
         let data = match channel.named.rename_frames(message.data, &mut self.renamed) {
             Renamed::Copied => &self.renamed,
@@ -134,6 +146,38 @@ impl LiveRouter {
         self.router.send_updated_maps(output)
     }
 
+    /// Learns which robots the frames in transforms of all robots follow, and renames them from now on.
+    fn learn_frames(&mut self, number: usize, data: &[u8], output: &Output<RobotMessages>) -> Result<(), StageError> {
+        let Some(channel) = self.channels.get(number) else { return Ok(()) };
+        let classified = self.router.roles().classify(&channel.original);
+        let has_changed = match classified.role {
+            Role::Map => self.frames.note_map(classified.robot, data),
+            Role::Tf if channel.named.is_shared_tf() => {
+                self.frames.note_transforms(number, is_static(&channel.original.topic), data)
+            }
+            _ => false,
+        };
+        if !has_changed {
+            return Ok(());
+        }
+        self.share_frames();
+        // Of static transforms nothing more comes.
+        for (number, data) in self.frames.kept() {
+            let Some(channel) = self.channels.get(*number) else { continue };
+            if channel.named.rename_frames(data, &mut self.renamed) == Renamed::Copied
+                && let Some(route) = self.router.add(channel.named.channel.clone(), output)?
+            {
+                self.router.learn(route, &self.renamed, output);
+            }
+        }
+        Ok(())
+    }
+
+    fn share_frames(&mut self) {
+        let all = self.channels.iter_mut().map(|channel| &mut channel.named);
+        all.filter(|named| named.is_shared_tf()).for_each(|named| named.share_frames(self.frames.shared().cloned()));
+    }
+
     fn role(&self, channel: &LiveChannel) -> Role {
         self.router.roles().classify(&channel.original).role
     }
@@ -154,6 +198,7 @@ impl LiveRouter {
             }
             channel.named = NamedChannel::new(named, robot.to_owned(), is_map, 0, true);
         }
+        self.share_frames();
     }
 }
 

@@ -5,6 +5,7 @@ mod channel;
 mod channel_router;
 mod derived;
 mod latched;
+mod live_frames;
 mod live_router;
 pub mod map_file;
 mod router;

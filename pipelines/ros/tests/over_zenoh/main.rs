@@ -8,6 +8,7 @@ mod bridge_verb;
 mod command;
 mod map_updates;
 mod network_namespaces;
+mod one_map_frame;
 mod python_robots;
 mod scans;
 mod stages;
