@@ -33,6 +33,7 @@ mod middleware;
 mod node;
 pub mod qos;
 mod robot_trees;
+pub mod ros_arguments;
 mod rtps;
 mod settled_frames;
 mod silence;
