@@ -7,6 +7,7 @@ mod both;
 #[allow(dead_code)]
 mod command;
 mod domain;
+mod network_namespaces;
 mod quality;
 mod ros_nodes;
 mod stages;

@@ -12,7 +12,7 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-fn script(name: &str) -> PathBuf {
+pub(crate) fn script(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(name)
 }
 
@@ -44,7 +44,7 @@ fn start_ready(name: &str, domain: &Domain, arguments: &[&str], words: &str, fol
 }
 
 /// Makes a log of two robots, `in.mcap`.
-fn simulate(folder: &Path) {
+pub(crate) fn simulate(folder: &Path) {
     let building = ["width=12", "height=10", "drift=0", "overlap=0.9", "tags=24", "beams=180", "duration=60"];
     let building = building.into_iter().flat_map(|setting| ["--set", setting]);
     let simulate: Vec<&str> = ["simulate", "-o", "in.mcap", "--robots", "2"].into_iter().chain(building).collect();
