@@ -46,10 +46,40 @@ impl Silence {
                 Some(format!(
                     "nobody publishes over DDS in the domain {domain}{zenoh}: is the ROS_DOMAIN_ID of the robots another one, or is \
                      ROS_LOCALHOST_ONLY or ROS_AUTOMATIC_DISCOVERY_RANGE set there or here? Where the network has no multicast, \
-                     `static_peers` names the robots' machines"
+                     `static_peers` names the robots' machines{}",
+                    not_spoken(|name| std::env::var(name).unwrap_or_default())
                 ))
             }
             _ => None,
         }
+    }
+}
+
+/// What the environment asks of programs of ROS on DDS and is not spoken here.
+fn not_spoken(variable: impl Fn(&str) -> String) -> String {
+    let mut text = String::new();
+    if !variable("ROS_DISCOVERY_SERVER").trim().is_empty() {
+        text.push_str(
+            ". ROS_DISCOVERY_SERVER is set, and discovery servers are not spoken: robots that use one are not found",
+        );
+    }
+    if variable("ROS_SECURITY_ENABLE") == "true" {
+        text.push_str(". ROS_SECURITY_ENABLE is set, and robots with DDS Security are not heard");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_keeps_robots_from_being_heard_is_named() {
+        let with = |set: &'static str, value: &'static str| {
+            not_spoken(|name| if name == set { value.to_owned() } else { String::new() })
+        };
+        assert!(with("ROS_DISCOVERY_SERVER", "127.0.0.1:11811").contains("discovery servers are not spoken"));
+        assert!(with("ROS_SECURITY_ENABLE", "true").contains("DDS Security"));
+        assert_eq!(with("ROS_SECURITY_ENABLE", "false") + &with("ROS_DOMAIN_ID", "5"), "");
     }
 }
