@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod both;
+mod built_messages;
 #[path = "../over_zenoh/command.rs"]
 #[allow(dead_code)]
 mod command;

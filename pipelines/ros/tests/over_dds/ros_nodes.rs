@@ -186,16 +186,24 @@ fn messages_of_a_log_are_what_ros_reads() {
     let folder = folder.path();
     simulate(folder);
     run(GRIDWEAVE, &["merge", "in.mcap", "-o", "merged.mcap"], folder);
-    let lines = |text: &str| -> Vec<serde_json::Value> {
-        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
-    };
     let read = lines(&start("rclpy_nodes.py", &domain, &["read_log", "merged.mcap"], folder).end_with(0));
     let kinds: BTreeSet<&str> = read.iter().map(|line| line["type"].as_str().unwrap()).collect();
     for kind in [OccupancyGrid::NAME, PoseStamped::NAME, "nav_msgs/msg/Path", "visualization_msgs/msg/MarkerArray"] {
         assert!(kinds.contains(kind), "{kinds:?}");
     }
     let printed = lines(&run(GRIDWEAVE, &["cat", "merged.mcap"], folder));
-    let printed: Vec<_> = printed.iter().filter(|line| kinds.contains(line["type"].as_str().unwrap())).collect();
+    let printed: Vec<_> = printed.into_iter().filter(|line| kinds.contains(line["type"].as_str().unwrap())).collect();
+    assert_alike(&read, &printed);
+}
+
+/// Lines of JSON.
+pub(crate) fn lines(text: &str) -> Vec<serde_json::Value> {
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+/// Messages as ROS reads them are what `gridweave cat` prints.
+#[track_caller]
+pub(crate) fn assert_alike(read: &[serde_json::Value], printed: &[serde_json::Value]) {
     assert_eq!(read.len(), printed.len());
     for (read, printed) in read.iter().zip(printed) {
         assert_eq!(read["topic"], printed["topic"]);
@@ -227,6 +235,15 @@ fn is_equal_in_32_bits(a: Option<f64>, b: Option<f64>) -> bool {
 fn hashes_of_types_are_those_of_the_packages() {
     let python = std::env::var("GRIDWEAVE_ROS_PYTHON").expect("GRIDWEAVE_ROS_PYTHON names a Python with rclpy");
     let share = Path::new(&python).parent().unwrap().join("../share");
+    let compared = compare_hashes(&share);
+    for package in ["geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs", "visualization_msgs"] {
+        assert!(compared.iter().any(|name| name.starts_with(package)), "{package}: {compared:?}");
+    }
+}
+
+/// Compares the hashes that packages in a folder state with those of the types that are known here, and gives the names of these.
+#[track_caller]
+pub(crate) fn compare_hashes(share: &Path) -> BTreeSet<String> {
     let mut compared = BTreeSet::new();
     for package in std::fs::read_dir(share).unwrap() {
         let Ok(types) = std::fs::read_dir(package.unwrap().path().join("msg")) else { continue };
@@ -246,9 +263,7 @@ fn hashes_of_types_are_those_of_the_packages() {
             }
         }
     }
-    for package in ["geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs", "visualization_msgs"] {
-        assert!(compared.iter().any(|name| name.starts_with(package)), "{package}: {compared:?}");
-    }
+    compared
 }
 
 /// Publishes until there is a warning.
