@@ -239,6 +239,13 @@ impl TfPoses {
         }
     }
 
+    /// Whether any transform was added that ties the map frame of a robot to another frame.
+    pub fn has_map_frame(&self, robot: &str) -> bool {
+        let is_end =
+            |map: &str| self.tree.edges.contains_key(map) || self.tree.edges.values().any(|edge| edge.parent == map);
+        self.map_frame(robot).is_some_and(is_end)
+    }
+
     /// Whether any transform was added.
     pub fn has_frames(&self) -> bool {
         !self.tree.edges.is_empty()

@@ -30,7 +30,8 @@ struct VerbArgs {
 impl Verb {
     /// The verb with its arguments, for the command line.
     pub(crate) fn command(&self) -> clap::Command {
-        <VerbArgs as clap::Args>::augment_args(clap::Command::new(self.name).about(self.about))
+        // After the arguments, whose own description it would otherwise have.
+        <VerbArgs as clap::Args>::augment_args(clap::Command::new(self.name)).about(self.about)
     }
 
     /// Parses the arguments and runs the verb. Returns the text to print.

@@ -24,6 +24,7 @@ mod processor_time;
 mod radon;
 mod results;
 mod statistics;
+mod tag_slam;
 mod trial;
 
 use anyhow::Result;
@@ -51,6 +52,8 @@ enum Experiment {
     Localization(localization::LocalizationArgs),
     /// Merging with few common tags, and whether robots of two buildings are ever merged by chance.
     FewTags(few_tags::FewTagsArgs),
+    /// Robots without maps whose odometry drifts, merged by the tags that they read.
+    TagSlam(tag_slam::TagSlamArgs),
     /// Map-only merges: random pairs, pairs of two buildings, self-similar buildings, and many robots.
     Align(align::AlignArgs),
     /// Merging pairs of map files by the maps alone: pairs with a truth, and thousands of different buildings.
@@ -76,6 +79,7 @@ fn main() -> Result<()> {
         Experiment::Methods(args) => methods::run(args, &registry, &mut results),
         Experiment::Localization(args) => localization::run(args, &mut results),
         Experiment::FewTags(args) => few_tags::run(args, &registry, &mut results),
+        Experiment::TagSlam(args) => tag_slam::run(args, &registry, &mut results),
         Experiment::Align(args) => align::run(args, &registry, &mut results),
         Experiment::MapPairs(args) => map_pairs::run(args, &registry, &mut results),
         Experiment::FitJudgement(args) => judgement::run(args, &registry, &mut results),

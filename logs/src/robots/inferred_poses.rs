@@ -1,4 +1,4 @@
-//! Poses of robots without a pose topic: from tf, or from odometry in the map frame.
+//! Poses of robots without a pose topic: from tf, or from odometry in the map frame, or in any where a robot has no map.
 
 use super::channels::RobotChannels;
 use super::mounts::BASES;
@@ -31,6 +31,8 @@ pub(crate) struct InferredPoses {
     origins: BTreeMap<String, Origin>,
     /// Robots whose map was received, so that its frame is known.
     mapped: BTreeSet<String>,
+    /// Robots without maps and scans: where tf has no map frame of theirs, that of their odometry is as good.
+    mapless: BTreeSet<String>,
     /// Odometry in a frame other than the map frame: topic and frame, by robot.
     elsewhere: BTreeMap<String, (String, String)>,
 }
@@ -50,6 +52,8 @@ impl InferredPoses {
             bases: BASES.map(|base| format!("{robot}{base}")).to_vec(),
         };
         self.tf.set_robots(channels.unposed().map(|robot| (robot.to_owned(), ends(robot))).collect());
+        let has_map = |robot: &&str| channels.mapped().chain(channels.scanned()).any(|other| other == *robot);
+        self.mapless = channels.unposed().filter(|robot| !has_map(robot)).map(str::to_owned).collect();
         let by_tf = channels.scanned().filter(|robot| channels.unposed().any(|unposed| unposed == *robot));
         let by_tf = by_tf.filter(|robot| !channels.has_odometry(robot));
         let in_odometry = |robot: &str| PoseFrames { map: format!("{robot}/{ODOMETRY_FRAME}"), ..ends(robot) };
@@ -105,6 +109,9 @@ impl InferredPoses {
 
     /// Whether the odometry of a robot, in the frame `frame`, gives its poses.
     pub(crate) fn takes_odometry(&mut self, robot: &str, topic: &str, frame: &str) -> bool {
+        if self.mapless.contains(robot) && !self.origins.contains_key(robot) && !self.tf.has_map_frame(robot) {
+            self.set_map_frame(robot, frame);
+        }
         if self.tf.map_frame(robot) != Some(frame) {
             let elsewhere = || (topic.to_owned(), frame.to_owned());
             self.elsewhere.entry(robot.to_owned()).or_insert_with(elsewhere);

@@ -1,6 +1,7 @@
 //! A graph of poses with relative measurements between them, and its most likely poses.
 
-use crate::shared::geometry::{Point2, Pose2, quarter_turn, wrap_angle};
+use crate::shared::geometry::relative_pose::{self, rotation_of_pose};
+use crate::shared::geometry::{Point2, Pose2, quarter_turn};
 use crate::shared::sparse::{Columns, Dissection, factor};
 use nalgebra::{Matrix3, UnitComplex, Vector3};
 use std::cmp::Ordering;
@@ -51,23 +52,10 @@ pub(super) fn turned_information(information: &Matrix3<f64>, rotation: &UnitComp
     by * information * by.transpose()
 }
 
-/// The matrix that turns (x, y, yaw).
-fn rotation_of_pose(rotation: &UnitComplex<f64>) -> Matrix3<f64> {
-    let (sine, cosine) = (rotation.im, rotation.re);
-    Matrix3::new(cosine, -sine, 0.0, sine, cosine, 0.0, 0.0, 0.0, 1.0)
-}
-
 impl Constraint {
-    /// Residual (x, y, yaw) at two poses, in the frame of `from`.
-    fn residual(&self, from: &Pose2, to: &Pose2) -> Vector3<f64> {
-        let found = from.inv_mul(to);
-        let off = found.translation.vector - self.transform.translation.vector;
-        Vector3::new(off.x, off.y, wrap_angle(found.rotation.angle() - self.transform.rotation.angle()))
-    }
-
     /// Squared residual at two poses, in variances.
     pub fn squared_residual(&self, poses: &[Pose2]) -> f64 {
-        let residual = self.residual(&poses[self.from], &poses[self.to]);
+        let residual = relative_pose::residual(&poses[self.from], &poses[self.to], &self.transform);
         residual.dot(&(self.information * residual))
     }
 
@@ -129,13 +117,10 @@ impl PoseGraph {
         }
         for constraint in &self.constraints {
             let (from, to) = (&self.poses[constraint.from], &self.poses[constraint.to]);
-            let residual = constraint.residual(from, to);
+            let residual = relative_pose::residual(from, to, &constraint.transform);
             let squared = residual.dot(&(constraint.information * residual));
             let information = constraint.information * constraint.weight(squared, width);
-            let by_to = rotation_of_pose(&from.rotation.inverse());
-            let arm = from.inv_mul(to).translation.vector;
-            let mut by_from = -by_to;
-            by_from.fixed_view_mut::<2, 1>(0, 2).copy_from(&-quarter_turn(&arm));
+            let [by_from, by_to] = relative_pose::derivatives(from, to);
             let sides = [(constraint.from, by_from), (constraint.to, by_to)];
             for (row, by_row) in &sides {
                 let weighted = by_row.transpose() * information;

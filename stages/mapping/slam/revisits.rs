@@ -20,19 +20,27 @@ const MAX_MOVE: [f64; 2] = [0.3, 0.1];
 /// Share of the information of a registration that counts: the scans of a submap are registered on the same points.
 const INFORMATION_SHARE: f64 = 0.3;
 
-/// Poses of scans in submaps that are at least `apart` scans before or after them.
+/// Poses of scans in submaps that are at least `apart` scans before or after them, by scan. The map of a submap is built, used and
+/// dropped: those of all at once would take as much memory as the drive is long.
 pub(super) fn register_on_revisited(revisit: &Revisit<'_>, apart: usize) -> Vec<Constraint> {
-    let near: Vec<Vec<usize>> = (0..revisit.scans.len()).map(|scan| near_submaps(revisit, scan, apart)).collect();
-    let map_of = |submap: usize| {
-        let is_used = near.iter().any(|submaps| submaps.contains(&submap));
-        is_used.then(|| revisit.map_around(submap, revisit.scans.len()))
+    // The scans near each submap, each with the place of that submap among its own.
+    let mut near: Vec<Vec<(usize, usize)>> = vec![Vec::new(); revisit.submaps.len()];
+    for scan in 0..revisit.scans.len() {
+        for (place, submap) in near_submaps(revisit, scan, apart).into_iter().enumerate() {
+            near[submap].push((scan, place));
+        }
+    }
+    let on_submap = |(submap, scans): (usize, &Vec<(usize, usize)>)| -> Vec<((usize, usize), Constraint)> {
+        if scans.is_empty() {
+            return Vec::new();
+        }
+        let map = revisit.map_around(submap, revisit.scans.len());
+        let on_it = |order: &(usize, usize)| Some((*order, register_on(revisit, order.0, submap, &map)?));
+        scans.iter().filter_map(on_it).collect()
     };
-    let maps: Vec<Option<LocalMap>> = (0..revisit.submaps.len()).into_par_iter().map(map_of).collect();
-    let on_submaps = |(scan, submaps): (usize, &Vec<usize>)| -> Vec<Constraint> {
-        let on_one = |submap: &usize| register_on(revisit, scan, *submap, maps[*submap].as_ref()?);
-        submaps.iter().filter_map(on_one).collect()
-    };
-    near.par_iter().enumerate().flat_map_iter(on_submaps).collect()
+    let mut found: Vec<((usize, usize), Constraint)> = near.par_iter().enumerate().flat_map_iter(on_submap).collect();
+    found.sort_by_key(|(order, _)| *order);
+    found.into_iter().map(|(_, constraint)| constraint).collect()
 }
 
 /// The nearest submaps of other times.

@@ -2,7 +2,7 @@
 
 use super::Drive;
 use crate::shared::placement::{Placed, Placement};
-use gridweave_runtime::ros::{Header, MapDeformation, Path, PoseStamped, PoseWithCovarianceStamped, RobotFrames};
+use gridweave_runtime::ros::{Header, MapDeformation, Path, PoseStamped, PoseWithCovarianceStamped, RobotFrames, Time};
 use gridweave_runtime::stage::{
     Context, Out, Output, OutputPorts, Outputs, Parameters, Received, StageError, StageKind,
 };
@@ -36,6 +36,12 @@ pub fn kind() -> StageKind {
         |parameters: PathPlacerParameters, _: &Context| Ok(PathPlacer { parameters, ..PathPlacer::default() }),
     )
     .inputs("pose", "the robots' poses in their maps", PathPlacer::receive_pose)
+    .optional_input(
+        "matched_pose",
+        "poses as they were matched with something, which stand in for those of the robot on `pose`; one that is older than \
+         the one before it begins a matched drive from the start",
+        PathPlacer::receive_matched_pose,
+    )
     .optional_input("deformation", "the deformations of the maps", PathPlacer::receive_deformation)
     .input("frames", "the poses of the maps", PathPlacer::receive_frames)
     .finish(PathPlacer::finish)
@@ -66,6 +72,8 @@ impl Outputs for Paths {
 struct PathPlacer {
     parameters: PathPlacerParameters,
     drives: BTreeMap<String, Drive>,
+    /// Of robots whose poses were matched: the drive as matched, and the time of its last pose.
+    matched: BTreeMap<String, (Drive, Time)>,
     placement: Placement,
     /// Whether a deformation has arrived that is in no path that was sent.
     has_new_deformations: bool,
@@ -87,6 +95,23 @@ impl PathPlacer {
             self.has_new_poses = true;
         }
         Ok(())
+    }
+
+    fn receive_matched_pose(&mut self, pose: Received<'_, PoseStamped>, _: &Output<Paths>) -> Result<(), StageError> {
+        let stamp = pose.header.stamp;
+        let (drive, last) = self.matched.entry(pose.robot().to_owned()).or_insert_with(|| (Drive::default(), stamp));
+        if stamp < *last {
+            *drive = Drive::default();
+        }
+        *last = stamp;
+        drive.add(stamp, pose.pose.planar(), self.parameters.spacing);
+        self.has_new_poses = true;
+        Ok(())
+    }
+
+    /// The drive of a robot: as it was matched, if it was.
+    fn drive(&self, robot: &str) -> Option<&Drive> {
+        self.matched.get(robot).map(|(drive, _)| drive).or_else(|| self.drives.get(robot))
     }
 
     /// A deformation waits for the frames that belong to it.
@@ -118,7 +143,7 @@ impl PathPlacer {
     fn send(&mut self, output: &Output<Paths>) -> Result<(), StageError> {
         (self.has_new_deformations, self.has_new_poses) = (false, false);
         for (robot, placed) in self.placement.placed() {
-            let Some(drive) = self.drives.get(robot) else { continue };
+            let Some(drive) = self.drive(robot) else { continue };
             let header = Header::new(output.log_time(), RobotFrames::WORLD);
             output.path.send(robot, &Path { header, poses: in_world(drive, &placed).collect() })?;
         }
@@ -127,7 +152,7 @@ impl PathPlacer {
 
     fn send_poses(&self, output: &Output<Paths>) -> Result<(), StageError> {
         for (robot, placed) in self.placement.placed() {
-            let Some(drive) = self.drives.get(robot) else { continue };
+            let Some(drive) = self.drive(robot) else { continue };
             in_world(drive, &placed).try_for_each(|pose| output.pose.send(robot, &pose))?;
         }
         Ok(())

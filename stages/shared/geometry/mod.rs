@@ -6,6 +6,7 @@ mod cell_box;
 mod grid;
 mod point_index;
 mod pose;
+pub mod relative_pose;
 mod rigid_fit;
 
 pub use cell_box::CellBox;

@@ -8,5 +8,5 @@ mod dissection;
 mod factoring;
 
 pub(crate) use block_cholesky::{BlockCholesky, SelectedInverse};
-pub(crate) use dissection::Dissection;
+pub(crate) use dissection::{Dissection, Part};
 pub(crate) use factoring::{Columns, factor};

@@ -10,6 +10,9 @@ use gridweave_runtime::ros::CommonTag;
 use nalgebra::Matrix3;
 use std::f64::consts::TAU;
 
+/// Residuals that are so many times as large as the covariances of the tags make likely are no noise.
+const EXPECTED_FACTOR: f64 = 2.0;
+
 /// A first guess of an alignment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FirstGuess {
@@ -114,7 +117,8 @@ pub fn first_guess(
     };
     let transform = translate(&pairs, &rotation, parameters.translation).ok_or(GuessError::NoRotation(count))?;
     let residual = residual(&pairs, &transform.transform_a_b);
-    if residual.is_nan() || residual > parameters.max_residual {
+    let limit = parameters.max_residual.max(EXPECTED_FACTOR * expected_residual(tags));
+    if residual.is_nan() || residual > limit {
         return Err(GuessError::Residual { count, residual });
     }
     let precisions = tags.iter().map(CommonTag::common_precision).filter(|precision| precision.is_finite());
@@ -139,6 +143,14 @@ pub(super) fn rotation_of_tags(
         true => Err(GuessError::WeakRotation { count, degrees: by_tags.deviation.to_degrees() }),
         false => Ok(by_tags),
     }
+}
+
+/// Root mean square of the tags' residuals by their covariances, metres; 0 if these are not finite.
+fn expected_residual(tags: &[CommonTag]) -> f64 {
+    let variance = |[xx, _, _, yy]: [f64; 4]| xx + yy;
+    let sum: f64 = tags.iter().map(|tag| variance(tag.covariance_a) + variance(tag.covariance_b)).sum();
+    let expected = (sum / tags.len().max(1) as f64).sqrt();
+    if expected.is_finite() { expected } else { 0.0 }
 }
 
 pub(super) fn tag_pairs(tags: &[CommonTag], parameters: &QuadrantClassifierParameters) -> Vec<TagPair> {
@@ -246,6 +258,18 @@ mod tests {
 
     fn guess(tags: &[CommonTag], a: Option<&Direction>, b: Option<&Direction>) -> Result<FirstGuess, GuessError> {
         first_guess(tags, a, b, &QuadrantClassifierParameters::default())
+    }
+
+    #[test]
+    fn tags_whose_positions_are_uncertain_by_metres_may_be_off_by_metres() {
+        let mut tags = tags(&pose(3.0, 4.0, 2.0));
+        tags[2].a[0] += 2.5;
+        assert!(matches!(guess(&tags, None, None), Err(GuessError::Residual { .. })));
+        for tag in &mut tags {
+            (tag.covariance_a, tag.covariance_b) = ([1.0, 0.0, 0.0, 1.0], [0.5, 0.0, 0.0, 0.5]);
+        }
+        let parameters = QuadrantClassifierParameters { max_tag_rotation_deviation: 3.0, ..Default::default() };
+        assert!(first_guess(&tags, None, None, &parameters).is_ok());
     }
 
     #[test]

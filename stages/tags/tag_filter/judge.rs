@@ -151,8 +151,8 @@ fn agreement(tags: &[CommonTag], parameters: &TagFilterParameters) -> Result<Agr
     let yaw_stddev = best.fit.yaw_stddev();
     if yaw_stddev > parameters.max_yaw_stddev {
         return Err(format!(
-            "the {agreeing} tags in common that agree{names} are so near to each other that the rotation is uncertain \
-             by {:.1} degrees",
+            "the {agreeing} tags in common that agree{names} determine the rotation to {:.1} degrees only: they are too near \
+             to each other, or their positions too uncertain",
             yaw_stddev.to_degrees()
         ));
     }

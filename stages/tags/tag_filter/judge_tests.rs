@@ -121,7 +121,7 @@ fn a_mirrored_map_is_refused() {
 fn tags_near_one_position_are_refused() {
     let cluster = [(0.0, 0.0), (0.1, 0.0), (0.0, 0.1), (0.1, 0.1), (0.05, 0.0)];
     let tags = tags(&pose(0.0, 0.0, 0.0), &cluster);
-    refused(&tags, &tags, "are so near to each other");
+    refused(&tags, &tags, "they are too near to each other");
     let one_place = self::tags(&pose(0.0, 0.0, 0.0), &[(1.0, 1.0); 4]);
     refused(&one_place, &one_place, "");
 }
@@ -166,7 +166,7 @@ fn two_tags_that_a_third_contradicts_are_refused() {
 
 #[test]
 fn two_tags_near_each_other_are_refused() {
-    for (places, part) in [([(0.0, 0.0), (1.0, 0.5)], "are so near"), ([(0.0, 0.0), (1.8, 0.5)], "by chance")] {
+    for (places, part) in [([(0.0, 0.0), (1.0, 0.5)], "they are too near"), ([(0.0, 0.0), (1.8, 0.5)], "by chance")] {
         let tags = tags(&pose(0.0, 0.0, 0.0), &places);
         refused(&tags, &tags, part);
     }

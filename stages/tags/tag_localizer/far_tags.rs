@@ -6,22 +6,19 @@
 //! by Gauss-Newton, with Cauchy weights against echoes. From the equations of each tag its position is eliminated (Schur
 //! complement), so the work grows with the readings and not with the area.
 
+use super::noise::{Noise, cost, weight};
 use super::{GridSize, Likelihood, Posterior, Ray, Readout, Ring, TagLocalizerParameters, TagMode, read_out};
 use crate::shared::geometry::{Point2, wrap_angle};
 use nalgebra::{Matrix2, Vector2};
 
-/// Residual in standard deviations at which a reading counts half.
-const HALF_WEIGHT: f64 = 2.0;
 /// Iterations before and after the noise is estimated.
 const ITERATIONS: usize = 40;
 /// An iteration that moves every tag by less is the last, metres.
 const SETTLED: f64 = 1e-4;
-/// Factor from the median absolute deviation to the standard deviation of a normal distribution.
-const MAD_TO_STDDEV: f64 = 1.4826;
-/// Largest number of readings in a row that count as one, as their errors are correlated.
-const MOST_CORRELATED: f64 = 20.0;
 /// Share of the readings that are at most as long as the radius of the grid on which a tag is searched.
 const MOST_READINGS: f64 = 0.95;
+/// Radius of the grid of a tag without ranges, in reaches of a tag of short range.
+const WIDER: f64 = 4.0;
 /// Factor by which that grid reaches farther.
 const MARGIN: f64 = 1.2;
 /// Least share of outliers in that search.
@@ -53,15 +50,6 @@ struct Calibration {
     information: Vector2<f64>,
 }
 
-/// How a tag's readings are weighed.
-#[derive(Clone, Copy, Debug)]
-struct Noise {
-    /// Factor of the standard deviations of its ranges.
-    factor: f64,
-    /// The number of ranges in a row that count as one.
-    correlated: f64,
-}
-
 /// Normal equations of one tag: of its position, of the calibration, and of both.
 #[derive(Clone, Copy, Debug, Default)]
 struct Equations {
@@ -76,6 +64,8 @@ struct Equations {
 struct Estimate<'a> {
     tag: &'a FarTag,
     place: Point2,
+    /// The grid on which it was searched.
+    grid: GridSize,
     /// Share of the probability of the mode in which it was searched.
     mass: f64,
     noise: Noise,
@@ -146,14 +136,16 @@ impl<'a> Estimate<'a> {
     /// Searches a tag on a grid that holds all places from which it could have been read, where the calibration is part of the
     /// noise.
     fn new(tag: &'a FarTag, parameters: &TagLocalizerParameters) -> Option<Self> {
-        let TagLocalizerParameters { offset_stddev, scale_stddev, outlier_share, .. } = *parameters;
+        let TagLocalizerParameters { offset_stddev, scale_stddev, outlier_share, reach, .. } = *parameters;
         let mut radii: Vec<f64> = tag.ranges.iter().map(|ring| ring.radius).collect();
         radii.sort_by(f64::total_cmp);
-        let largest = *radii.get(((radii.len().saturating_sub(1)) as f64 * MOST_READINGS) as usize)?;
-        let anchor = tag.ranges.first()?.centre;
-        let mean = tag.ranges.iter().map(|ring| ring.centre - anchor).sum::<Vector2<f64>>() / tag.ranges.len() as f64;
-        let centre = anchor + mean;
-        let spread = tag.ranges.iter().map(|ring| (ring.centre - centre).norm()).fold(0.0, f64::max);
+        let usual = radii.get((radii.len().saturating_sub(1) as f64 * MOST_READINGS) as usize);
+        let largest = usual.copied().unwrap_or(WIDER * reach);
+        let seen = || tag.seen.iter().chain(&tag.ranges).map(|ring| ring.centre);
+        let centres: Vec<Point2> = seen().chain(tag.rays.iter().map(|ray| ray.origin)).collect();
+        let anchor = *centres.first()?;
+        let centre = anchor + centres.iter().map(|place| place - anchor).sum::<Vector2<f64>>() / centres.len() as f64;
+        let spread = centres.iter().map(|place| (place - centre).norm()).fold(0.0, f64::max);
         let cells = parameters.cells();
         let grid = GridSize { centre, cells, resolution: 2.0 * (MARGIN * largest + spread) / cells as f64 };
         let uncalibrated = tag.ranges.iter().map(|ring| {
@@ -164,8 +156,7 @@ impl<'a> Estimate<'a> {
         let outliers = outlier_share.max(SEARCH_OUTLIERS);
         let likelihood = Likelihood::new(rings, tag.rays.iter().copied(), outliers, largest);
         let mode = read_out(&Posterior::new(&likelihood, grid)?, Readout::Window, SEARCH_WINDOW)?;
-        let noise = Noise { factor: 1.0, correlated: 1.0 };
-        Some(Self { tag, place: mode.position, mass: mode.mass, noise })
+        Some(Self { tag, place: mode.position, grid, mass: mode.mass, noise: Noise::CLAIMED })
     }
 
     /// Residual of a range at the tag's place, in standard deviations.
@@ -212,22 +203,13 @@ impl<'a> Estimate<'a> {
 
     /// The noise of the ranges by their residuals: at least what they claim.
     fn found_noise(&self, calibration: &Calibration) -> Noise {
-        let residuals: Vec<f64> = self.tag.ranges.iter().map(|ring| self.residual(ring, calibration)).collect();
-        let mut sizes: Vec<f64> = residuals.iter().map(|residual| residual.abs()).collect();
-        sizes.sort_by(f64::total_cmp);
-        let factor = (MAD_TO_STDDEV * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0)).max(1.0);
-        // Echoes are not part of the correlation.
-        let usual: Vec<f64> = residuals.iter().map(|residual| (residual / factor).clamp(-3.0, 3.0)).collect();
-        let squares: f64 = usual.iter().map(|one| one * one).sum();
-        let products: f64 = usual.iter().zip(usual.iter().skip(1)).map(|(one, next)| one * next).sum();
-        let correlation = (products / squares.max(f64::MIN_POSITIVE)).clamp(0.0, 0.99);
-        let correlated = ((1.0 + correlation) / (1.0 - correlation)).min(MOST_CORRELATED);
-        Noise { factor, correlated }
+        let claimed = Self { noise: Noise::CLAIMED, ..*self };
+        let residuals: Vec<f64> = self.tag.ranges.iter().map(|ring| claimed.residual(ring, calibration)).collect();
+        Noise::of(&residuals)
     }
 
     /// Negative log-likelihood of the readings.
     fn cost(&self, calibration: &Calibration) -> f64 {
-        let cost = |residual: f64| 0.5 * HALF_WEIGHT * HALF_WEIGHT * (residual / HALF_WEIGHT).powi(2).ln_1p();
         let ranges: f64 = self.tag.ranges.iter().map(|ring| cost(self.residual(ring, calibration))).sum();
         let seen = self.tag.seen.iter().map(|ring| cost((self.place - ring.centre).norm() / ring.variance.sqrt()));
         let rays = self.tag.rays.iter().map(|ray| {
@@ -244,7 +226,9 @@ impl<'a> Estimate<'a> {
         let by_calibration = inverse * equations.mixed;
         let covariance = inverse + by_calibration * covariance * by_calibration.transpose();
         let certainty = self.mass * self.share_of_mirror_image(calibration, &covariance);
-        let is_valid = certainty.is_finite() && covariance.iter().all(|value| value.is_finite());
+        // Too few readings may lead it anywhere.
+        let is_in_grid = (self.place - self.grid.centre).amax() <= 0.5 * self.grid.resolution * self.grid.cells as f64;
+        let is_valid = is_in_grid && certainty.is_finite() && covariance.iter().all(|value| value.is_finite());
         let (position, mass) = (self.place, self.mass);
         is_valid.then_some(TagMode { position, covariance, certainty, window: position, mass })
     }
@@ -282,11 +266,6 @@ impl<'a> Estimate<'a> {
         }
         1.0 / (1.0 + (self.cost(calibration) - mirror.cost(calibration)).exp())
     }
-}
-
-/// Cauchy weight of a residual in standard deviations.
-fn weight(residual: f64) -> f64 {
-    1.0 / (1.0 + (residual / HALF_WEIGHT).powi(2))
 }
 
 #[cfg(test)]

@@ -1,12 +1,14 @@
 //! Localization of the tags of one robot.
 
 use super::far_tags::{self, FarTag};
+use super::landmark_slam::{self, Keyframes, LocatedTags};
+use super::measured::Measured;
 use super::tag::{REACH_TOLERANCE, Tag};
 use super::{
     Bearing, BearingGroups, NoPose, PoseTrack, Position, Reading, ReadingGroups, Sighting, SightingGroups,
     TagLocalizerParameters, TagMode, largest_variance,
 };
-use crate::shared::geometry::Point2;
+use crate::shared::geometry::{Point2, Pose2, pose};
 use gridweave_runtime::message::LogTime;
 use nalgebra::{Matrix2, Rotation2, Vector2};
 use std::collections::BTreeMap;
@@ -20,7 +22,10 @@ const LEAST_ABSENCE: f64 = 1.0;
 const LEAST_SIGHTING_STDDEV: f64 = 0.01;
 /// Largest distance at which a camera sees a tag, or a radio reads it, metres.
 const FARTHEST: f64 = 1000.0;
-/// Tags of long range are located again when there are so many times as many readings, and at the end.
+/// Least distance between keyframes, metres.
+const LEAST_SPACING: f64 = 0.1;
+/// Tags of long range, and tags with the drive, are located again when there are so many times as many readings, and at the
+/// end.
 const MORE_READINGS: f64 = 1.5;
 
 /// Localizes all tags of one robot from its poses and readings.
@@ -35,6 +40,11 @@ pub struct TagLocalizer {
     waited: u64,
     /// Number of readings of tags of long range when these were last located.
     far_readings: u32,
+    /// The poses and readings, if the poses may be those of an odometry that drifts.
+    drive: Option<Keyframes>,
+    /// Number of its readings when the tags were last located with it.
+    drive_readings: usize,
+    estimated_poses: Vec<(LogTime, Pose2)>,
 }
 
 /// A reading: its time, its tag, and its measurement.
@@ -45,18 +55,6 @@ struct TagReading {
     measured: Measured,
     /// Metres.
     stddev: f64,
-}
-
-/// A measurement of a tag.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Measured {
-    /// Distance, metres.
-    Range(f64),
-    /// Position relative to the robot: metres ahead, and to the left.
-    Place(Vector2<f64>),
-    /// Bearing, radians from straight ahead of the robot, with its standard deviation, relative to the sensor: metres
-    /// ahead of the robot, and to its left.
-    Bearing { sensor: Vector2<f64>, bearing: f64, stddev: f64 },
 }
 
 /// Why a reading is left out.
@@ -97,8 +95,23 @@ impl fmt::Display for ReadingProblem {
 impl TagLocalizer {
     /// A robot without readings.
     pub fn new(parameters: TagLocalizerParameters) -> Self {
-        let (track, tags, pending) = (PoseTrack::default(), BTreeMap::new(), BTreeMap::new());
-        Self { parameters, track, tags, pending, waited: 0, far_readings: 0 }
+        Self {
+            track: PoseTrack::default(),
+            tags: BTreeMap::new(),
+            pending: BTreeMap::new(),
+            waited: 0,
+            far_readings: 0,
+            drive: parameters.drift.then(|| Keyframes::new(parameters.min_travel.max(LEAST_SPACING))),
+            drive_readings: 0,
+            estimated_poses: Vec::new(),
+            parameters,
+        }
+    }
+
+    /// The poses of the robot as they were estimated with the tags, where the poses that it got drift: a batch with its last
+    /// estimate, once.
+    pub fn take_estimated_poses(&mut self) -> Vec<(LogTime, Pose2)> {
+        std::mem::take(&mut self.estimated_poses)
     }
 
     /// Adds a pose of the robot, and the readings that waited for it. Returns `false`, and ignores it, if it is older
@@ -106,6 +119,9 @@ impl TagLocalizer {
     pub fn add_pose(&mut self, time: LogTime, position: Position, mut problem: impl FnMut(ReadingProblem)) -> bool {
         if !self.track.add(time, position) {
             return false;
+        }
+        if let Some(drive) = &mut self.drive {
+            drive.add_pose(time, &pose(position.place.x, position.place.y, position.yaw));
         }
         while let Some(entry) = self.pending.first_entry().filter(|entry| entry.key().0 <= time) {
             let reading = entry.remove();
@@ -217,6 +233,10 @@ impl TagLocalizer {
         if !first_place.iter().all(|value| value.is_finite()) {
             return Err(ReadingProblem::NoPosition);
         }
+        if let Some(drive) = &mut self.drive {
+            let here = pose(position.place.x, position.place.y, position.yaw);
+            drive.add_reading(&here, &tag_id, measured, stddev);
+        }
         let tag = self.tags.entry(tag_id).or_insert_with(|| Tag {
             first_place,
             groups: ReadingGroups::default(),
@@ -278,10 +298,17 @@ impl TagLocalizer {
     }
 
     fn read_out_if(&mut self, is_end: bool, due: impl Fn(&(LogTime, Point2, f64)) -> bool) -> bool {
+        let least = self.parameters.min_readings;
+        let is_due = |tag: &Tag| tag.changed && tag.readings() >= least && due(&tag.last);
+        if self.tags.values().any(&is_due)
+            && let Some(any) = self.locate_with_drive(is_end)
+        {
+            return any;
+        }
         let parameters = &self.parameters;
         let (mut any, mut any_far) = (false, false);
         for tag in self.tags.values_mut() {
-            if !(tag.changed && tag.readings() >= parameters.min_readings && due(&tag.last)) {
+            if !is_due(tag) {
                 continue;
             }
             if tag.is_far() {
@@ -312,6 +339,26 @@ impl TagLocalizer {
             tag.mode = modes.next().flatten().map(|mode| tag.with_shared_error(mode, parameters));
         }
         true
+    }
+
+    /// Locates all tags together with the drive, if its odometry may drift. Returns whether any was located, and `None` if that is
+    /// left to the tags one by one.
+    fn locate_with_drive(&mut self, is_end: bool) -> Option<bool> {
+        let drive = self.drive.as_ref()?;
+        let is_more = drive.len() as f64 >= MORE_READINGS * self.drive_readings as f64;
+        if !(is_more || is_end) || drive.len() < self.parameters.min_readings as usize {
+            return Some(false);
+        }
+        self.drive_readings = drive.len();
+        let LocatedTags { modes, poses } = landmark_slam::locate(drive, &self.parameters)?;
+        self.estimated_poses = poses;
+        for (id, mode) in modes {
+            if let Some(tag) = self.tags.get_mut(&id) {
+                tag.changed = false;
+                tag.mode = mode.map(|mode| tag.with_shared_error(mode, &self.parameters));
+            }
+        }
+        Some(true)
     }
 
     /// Number of ranges from beyond the reach of the tags that they are of.

@@ -14,12 +14,16 @@
 //! - [`read_out`] finds the window, and the mode around it.
 //! - `far_tags` locates tags that are read from beyond `reach`, together with the calibration of the radio: on no grid of
 //!   fine cells, as that of a large area would be.
+//! - `landmark_slam` estimates the drive with the tags, where poses by odometry drift.
 //! - [`PoseTrack`] interpolates the pose of the robot at the time of a reading, with its covariance.
 
 mod bearing_groups;
 mod far_tags;
+mod landmark_slam;
 mod likelihood;
 mod localizer;
+mod measured;
+mod noise;
 mod parameters;
 mod pose_covariance;
 mod pose_track;

@@ -88,6 +88,9 @@ pub struct TagLocalizerParameters {
     pub max_pose_age: f64,
     /// A tag with fewer readings is not reported.
     pub min_readings: u32,
+    /// Whether the poses may be those of an odometry that drifts: then, if the readings show that it does, tags and poses are
+    /// estimated together, in the frame of the first pose. Not for robots with maps, in which their poses do not drift.
+    pub drift: bool,
 }
 
 impl Default for TagLocalizerParameters {
@@ -112,6 +115,7 @@ impl Default for TagLocalizerParameters {
             timeout: 2.0,
             max_pose_age: 0.5,
             min_readings: 5,
+            drift: false,
         }
     }
 }

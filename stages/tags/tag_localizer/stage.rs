@@ -7,7 +7,7 @@ use super::{
 use crate::shared::geometry::Point2;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{
-    Header, PoseWithCovarianceStamped, TagBearing, TagEstimate, TagEstimates, TagPosition, TagRange, Time,
+    Header, PoseStamped, PoseWithCovarianceStamped, TagBearing, TagEstimate, TagEstimates, TagPosition, TagRange, Time,
 };
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
 use nalgebra::{Matrix2, Vector2};
@@ -57,11 +57,20 @@ struct Robot {
 
 struct Estimates {
     estimates: Out<TagEstimates>,
+    pose: Out<PoseStamped>,
 }
 
 impl Outputs for Estimates {
     fn declare(ports: &mut OutputPorts) -> Self {
-        Self { estimates: ports.output("estimates", "all tags of one robot, the most certain first") }
+        Self {
+            estimates: ports.output("estimates", "all tags of one robot, the most certain first"),
+            pose: ports.side_output_on(
+                "/{robot}/matched_pose",
+                "pose",
+                "with `drift`: where a robot whose odometry drifts was, as estimated with the tags. Each estimate is sent from \
+                 the first pose on, with the times of the poses in the headers",
+            ),
+        }
     }
 }
 
@@ -225,7 +234,11 @@ impl Robot {
             .collect();
         // The sort is stable, and the tags are sorted by id.
         tags.sort_by(|a, b| b.certainty.total_cmp(&a.certainty));
-        let header = Header::new(output.log_time(), self.frame_id.clone().unwrap_or_default());
+        let frame_id = self.frame_id.clone().unwrap_or_default();
+        for (time, pose) in self.localizer.take_estimated_poses() {
+            output.pose.send(name, &PoseStamped { header: Header::new(time, &frame_id), pose: pose.into() })?;
+        }
+        let header = Header::new(output.log_time(), frame_id);
         output.estimates.send(name, &TagEstimates { header, robot: name.to_owned(), tags })
     }
 }

@@ -81,6 +81,23 @@ fn odometry_gives_poses_if_it_is_in_the_frame_of_the_map_and_nothing_else_does()
 }
 
 #[test]
+fn odometry_in_any_frame_gives_the_poses_of_a_robot_that_reads_tags_and_has_no_map() {
+    let (_folder, files) = write(|log| {
+        let reading = TagRange { tag_id: "a".to_owned(), range: 2.0, ..Default::default() };
+        log.add("/robot1/tag_ranges", TagRange::NAME, 1, &reading)
+            .add("/robot1/odom", ODOMETRY, 2, &odometry_in("robot1/odom", 2.0))
+            .add("/tf", TFMessage::NAME, 3, &tf("robot1/odom", "robot1/base_link", 3, 3.0))
+            // A robot whose map frame is in tf.
+            .add("/robot2/tag_ranges", TagRange::NAME, 4, &reading)
+            .add("/tf", TFMessage::NAME, 5, &tf("robot2/map", "robot2/odom", 5, 1.0))
+            .add("/robot2/odom", ODOMETRY, 6, &odometry_in("robot2/odom", 6.0))
+            .add("/tf", TFMessage::NAME, 7, &tf("robot2/odom", "robot2/base_link", 7, 3.0));
+    });
+    let run = run(files);
+    assert_eq!(poses(&run), [pose("robot1", "robot1/odom", 2.0), pose("robot2", "robot2/map", 4.0)]);
+}
+
+#[test]
 fn transforms_before_the_start_give_poses_after_it() {
     let (_folder, files) = write(|log| {
         let second = 1_000_000_000;
