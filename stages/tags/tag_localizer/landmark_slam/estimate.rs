@@ -24,6 +24,8 @@ const DRIFT_FACTOR: f64 = 1.5;
 const MOST_ROUNDS: usize = 12;
 /// The drift is no less than this, after a metre.
 const LEAST_DRIFT: OdometryDrift = OdometryDrift { position: 1e-3, yaw: 1e-4 };
+/// And no more.
+const MOST_DRIFT: OdometryDrift = OdometryDrift { position: 0.5, yaw: 0.5 };
 /// Parts of the drive, one after the other added to the estimate.
 const PARTS: usize = 24;
 /// Least certainty of a tag's position, for it to become part of the estimate.
@@ -65,7 +67,7 @@ pub(in super::super) fn locate(keyframes: &Keyframes, parameters: &TagLocalizerP
     })?;
     let drifting = with_best_drift(best);
     let mut rigid = drifting.without_drift();
-    match is_more_probable(&mut rigid, &drifting) {
+    match is_more_probable(&mut rigid, &drifting, number_of_drifts().ln()) {
         true => located(keyframes, parameters, &rigid),
         false => located(keyframes, parameters, &drifting),
     }
@@ -75,13 +77,27 @@ pub(in super::super) fn locate(keyframes: &Keyframes, parameters: &TagLocalizerP
 /// for noise.
 fn more_probable<'a>(first: LandmarkGraph<'a>, second: LandmarkGraph<'a>) -> LandmarkGraph<'a> {
     let mut alike = first.with_noise_of(&second);
-    if is_more_probable(&mut alike, &second) { first } else { second }
+    if is_more_probable(&mut alike, &second, 0.0) { first } else { second }
 }
 
-/// Whether an estimate, after it is settled, explains the readings better than another one, with the same noise.
-fn is_more_probable(graph: &mut LandmarkGraph<'_>, than: &LandmarkGraph<'_>) -> bool {
+/// Whether an estimate, after it is settled, is more probable than another one by the readings, with the same noise. `prior` is the
+/// logarithm of how much more probable it is before them.
+fn is_more_probable(graph: &mut LandmarkGraph<'_>, than: &LandmarkGraph<'_>, prior: f64) -> bool {
     let found = graph.settle().then(|| graph.evidence()).flatten();
-    found.is_some_and(|found| than.evidence().is_none_or(|other| found > other))
+    found.is_some_and(|found| than.evidence().is_none_or(|other| found + prior > other))
+}
+
+/// Whether a drift is one of those that are compared.
+fn is_considered(drift: &OdometryDrift) -> bool {
+    (LEAST_DRIFT.position..=MOST_DRIFT.position).contains(&drift.position)
+        && (LEAST_DRIFT.yaw..=MOST_DRIFT.yaw).contains(&drift.yaw)
+}
+
+/// Number of drifts that are compared. That poses do not drift is as probable beforehand as that they drift in any of these ways:
+/// so it is that many times as probable as each.
+fn number_of_drifts() -> f64 {
+    let steps = |least: f64, most: f64| (most / least).ln() / DRIFT_FACTOR.ln();
+    steps(LEAST_DRIFT.position, MOST_DRIFT.position) * steps(LEAST_DRIFT.yaw, MOST_DRIFT.yaw)
 }
 
 /// An estimate that grows along the drive: so no part of it is far off when it is added. `None` if no tag is located.
@@ -182,11 +198,10 @@ fn with_best_drift(mut graph: LandmarkGraph<'_>) -> LandmarkGraph<'_> {
             OdometryDrift { position, yaw: yaw / DRIFT_FACTOR },
             OdometryDrift { position, yaw: yaw * DRIFT_FACTOR },
         ];
-        let allowed =
-            others.into_iter().filter(|drift| drift.position >= LEAST_DRIFT.position && drift.yaw >= LEAST_DRIFT.yaw);
+        let allowed = others.into_iter().filter(is_considered);
         let better = allowed
             .map(|drift| graph.with_drift(drift))
-            .find_map(|mut other| is_more_probable(&mut other, &graph).then_some(other));
+            .find_map(|mut other| is_more_probable(&mut other, &graph, 0.0).then_some(other));
         let Some(mut better) = better else { break };
         better.estimate_noise();
         graph = better;
