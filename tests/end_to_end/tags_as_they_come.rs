@@ -239,7 +239,7 @@ fn merged_drives(
     let summary: Value = serde_json::from_slice(&fs::read(folder.path().join("summary.json")).unwrap()).unwrap();
     let number = |field: &str| summary["frames"]["robot2"][field].as_f64().unwrap();
     let found = Isometry2::new(Vector2::new(number("x"), number("y")), number("yaw"));
-    let file = LogFile::open(&folder.path().join("out.mcap")).unwrap();
+    let file = LogFile::open(folder.path().join("out.mcap")).unwrap();
     let path = file.channels().find(|(_, channel)| channel.topic == "/robot2/merged_path").unwrap().0;
     let mut reader = LogReader::new(vec![file]);
     let mut last = None;

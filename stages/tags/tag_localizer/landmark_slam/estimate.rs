@@ -67,9 +67,12 @@ pub(in super::super) fn locate(keyframes: &Keyframes, parameters: &TagLocalizerP
     })?;
     let drifting = with_best_drift(best);
     let mut rigid = drifting.without_drift();
-    match is_more_probable(&mut rigid, &drifting, number_of_drifts().ln()) {
-        true => located(keyframes, parameters, &rigid),
-        false => located(keyframes, parameters, &drifting),
+    let prior = number_of_drifts().ln();
+    match (is_more_probable(&mut rigid, &drifting, 0.0), is_more_probable(&mut rigid, &drifting, prior)) {
+        (true, _) => located(keyframes, parameters, &rigid, &rigid),
+        // There may be drift: the positions are those without it, and as uncertain as with it.
+        (false, true) => located(keyframes, parameters, &rigid, &drifting),
+        (false, false) => located(keyframes, parameters, &drifting, &drifting),
     }
 }
 
@@ -210,9 +213,15 @@ fn with_best_drift(mut graph: LandmarkGraph<'_>) -> LandmarkGraph<'_> {
     graph
 }
 
-/// What an estimate says of the tags. A tag that a search at the estimated poses finds elsewhere is not located.
-fn located(drive: &Keyframes, parameters: &TagLocalizerParameters, graph: &LandmarkGraph<'_>) -> Option<LocatedTags> {
-    let covariance = graph.covariance_of_tags()?;
+/// The tags by an estimate, with the covariance that another one of the same tags gives them. A tag that a search at the estimated
+/// poses finds elsewhere is not located.
+fn located(
+    drive: &Keyframes,
+    parameters: &TagLocalizerParameters,
+    graph: &LandmarkGraph<'_>,
+    uncertain: &LandmarkGraph<'_>,
+) -> Option<LocatedTags> {
+    let covariance = uncertain.covariance_of_tags()?;
     let places: Vec<Point2> = graph.tags.iter().flatten().copied().collect();
     let widened = covariance.clone() * common_error(&places, &covariance);
     let frame = frame(drive, graph);
