@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_node_takes_is_told_as_arguments_of_ours() {
+    fn arguments_of_a_node_have_counterparts() {
         for (line, instead) in [
             ("run a.toml --ros-args -r /map:=/fleet/map", "\n    --set ros.rename='[\"/map=/fleet/map\"]'"),
             (

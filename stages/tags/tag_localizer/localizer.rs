@@ -120,7 +120,8 @@ impl TagLocalizer {
         if !self.track.add(time, position) {
             return false;
         }
-        if let Some(drive) = &mut self.drive {
+        // Without a heading a pose is none of odometry.
+        if let Some(drive) = self.drive.as_mut().filter(|_| position.yaw.is_finite()) {
             drive.add_pose(time, &pose(position.place.x, position.place.y, position.yaw));
         }
         while let Some(entry) = self.pending.first_entry().filter(|entry| entry.key().0 <= time) {
@@ -233,7 +234,7 @@ impl TagLocalizer {
         if !first_place.iter().all(|value| value.is_finite()) {
             return Err(ReadingProblem::NoPosition);
         }
-        if let Some(drive) = &mut self.drive {
+        if let Some(drive) = self.drive.as_mut().filter(|_| position.yaw.is_finite()) {
             let here = pose(position.place.x, position.place.y, position.yaw);
             drive.add_reading(&here, &tag_id, measured, stddev);
         }
@@ -344,9 +345,9 @@ impl TagLocalizer {
     /// Locates all tags together with the drive, if its odometry may drift. Returns whether any was located, and `None` if that is
     /// left to the tags one by one.
     fn locate_with_drive(&mut self, is_end: bool) -> Option<bool> {
-        let drive = self.drive.as_ref()?;
+        let drive = self.drive.as_ref().filter(|drive| drive.len() >= self.parameters.min_readings as usize)?;
         let is_more = drive.len() as f64 >= MORE_READINGS * self.drive_readings as f64;
-        if !(is_more || is_end) || drive.len() < self.parameters.min_readings as usize {
+        if !(is_more || is_end) {
             return Some(false);
         }
         self.drive_readings = drive.len();

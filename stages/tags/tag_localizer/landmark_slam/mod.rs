@@ -8,15 +8,19 @@
 //!
 //! - [`Keyframes`] is the odometry by keyframes, with the readings at each; [`step`] is how its error grows between two.
 //! - [`LandmarkGraph`] is an estimate of all unknowns; [`residuals`] has the factors of the readings.
-//! - [`estimate`] builds an estimate along the drive and chooses the drift.
+//! - [`estimate`] builds an estimate along the drive, where [`search`] finds new tags, and chooses the drift.
+//! - [`LocatedTags`] is the outcome, with the frame in which it is and how certain that is.
 
 mod estimate;
 mod graph;
 mod keyframes;
+mod located_tags;
 mod residuals;
+mod search;
 mod step;
 #[cfg(test)]
 mod tests;
 
-pub(super) use estimate::{LocatedTags, locate};
+pub(super) use estimate::locate;
 pub(super) use keyframes::Keyframes;
+pub(super) use located_tags::LocatedTags;

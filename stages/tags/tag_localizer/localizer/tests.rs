@@ -51,6 +51,20 @@ fn a_fifth_of_outliers_does_no_harm() {
 }
 
 #[test]
+fn ranges_at_poses_without_a_heading_locate_a_tag_where_odometry_may_drift() {
+    let parameters = TagLocalizerParameters { drift: true, ..TagLocalizerParameters::default() };
+    let mut localizer = TagLocalizer::new(parameters);
+    for (step, (x, y)) in corner().enumerate() {
+        let (time, without) = (at(0.1 * step as f64), Position { yaw: f64::NAN, ..position(x, y) });
+        assert!(localizer.add_pose(time, without, |problem| panic!("{problem}")));
+        localizer.add_reading(time, "tag", (TAG - Point2::new(x, y)).norm(), 0.05).unwrap();
+    }
+    assert!(localizer.read_out_all() && localizer.take_estimated_poses().is_empty());
+    let mode = *localizer.modes().next().unwrap().1;
+    assert!((mode.position - TAG).norm() < 0.05, "{mode:?}");
+}
+
+#[test]
 fn a_straight_drive_leaves_a_certainty_of_about_one_half() {
     let mode = locate(TagLocalizerParameters::default(), 0.0, (0..100).map(|step| (0.02 * f64::from(step), 0.0)));
     assert!(mode.certainty > 0.3 && mode.certainty < 0.6, "{mode:?}");
