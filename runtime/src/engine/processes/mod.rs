@@ -23,6 +23,7 @@ mod drain;
 mod event;
 mod process;
 mod protocol;
+mod spawn;
 mod supervisor;
 mod suspend_detector;
 mod system;

@@ -6,6 +6,7 @@ use super::drain::{Drain, STUCK_AFTER};
 use super::event::{Event, read_reports};
 use super::process::Process;
 use super::protocol::{ProcessReport, SupervisorCommand};
+use super::spawn::spawn;
 use super::suspend_detector::SuspendDetector;
 use super::system::describe_exit;
 use crate::engine::run_folder::{RunFolder, clean_after};
@@ -14,17 +15,12 @@ use crate::link::{LinkError, RunNames, StageCounter, StageCounters, StageState, 
 use crate::pipeline::{Mode, Pipeline, Restart};
 use iceoryx2::service::ipc;
 use std::collections::BTreeMap;
-use std::env;
 use std::io::{self, Write};
-use std::os::unix::process::CommandExt;
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{Child, ChildStdin};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
 use std::time::{Duration, Instant};
-use tracing::{Level, event_enabled};
 
-/// The environment variable with the log filter.
-const LOG_FILTER: &str = "RUST_LOG";
 /// The maximum time between two checks whether the run should stop.
 const STOP_INTERVAL: Duration = Duration::from_millis(50);
 /// The time that a process has to close its outputs before it is killed.
@@ -132,31 +128,15 @@ impl Supervisor<'_> {
 
     /// Starts the process called `name`, with the index `process`, and reads its reports.
     fn start(&mut self, name: &str, process: usize) -> Result<(Child, Option<ChildStdin>), Failure> {
-        let mut command = Command::new(&self.launch.program);
-        // The other processes log at the level of this one.
-        if let Some(level) = verbose_log_level().filter(|_| env::var_os(LOG_FILTER).is_none()) {
-            command.env(LOG_FILTER, level);
-        }
-        let mut child = command
-            .args(&self.launch.arguments)
-            .arg(self.folder.path())
-            .arg(name)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            // An interrupt from the terminal is for the supervisor, which stops the others.
-            .process_group(0)
-            .spawn()
-            .map_err(|error| Failure::Process(format!("cannot start {}: {error}", self.launch.program.display())))?;
+        let mut child = spawn(self.launch, self.folder.path(), name)?;
         if let Some(stdout) = child.stdout.take() {
             let events = self.events.clone();
-            match thread::Builder::new().spawn(move || read_reports(process, stdout, &events)) {
-                Ok(reader) => self.readers.push(reader),
-                Err(error) => {
-                    // Without a reader of its reports it ends by itself, too.
-                    let _ = child.kill().and_then(|()| child.wait());
-                    return Err(Failure::Process(format!("cannot start a thread: {error}")));
-                }
-            }
+            let reader = thread::Builder::new().spawn(move || read_reports(process, stdout, &events));
+            self.readers.push(reader.map_err(|error| {
+                // Without a reader of its reports it ends by itself, too.
+                let _ = child.kill().and_then(|()| child.wait());
+                Failure::Process(format!("cannot start a thread: {error}"))
+            })?);
         }
         let stdin = child.stdin.take();
         Ok((child, stdin))
@@ -394,14 +374,4 @@ fn remove_dead_nodes(names: &RunNames) {
     if let Ok(node) = names.node::<ipc::Service>() {
         node.try_cleanup_dead_nodes();
     }
-}
-
-/// The most verbose log level that is enabled, if it is more verbose than warnings.
-fn verbose_log_level() -> Option<&'static str> {
-    let levels = [
-        ("trace", event_enabled!(Level::TRACE)),
-        ("debug", event_enabled!(Level::DEBUG)),
-        ("info", event_enabled!(Level::INFO)),
-    ];
-    levels.into_iter().find_map(|(level, is_enabled)| is_enabled.then_some(level))
 }
