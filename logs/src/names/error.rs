@@ -16,6 +16,16 @@ pub enum NameError {
         "the logs have equal topics, and their file names do not distinguish the robots: {0}; or set the robots with ROBOT=LOG"
     )]
     SameNames(#[from] FileNameError),
+    /// A topic is renamed to that of another one, whose messages would be mixed with its own.
+    #[error("`{one}` and `{other}` would both be `{topic}`: rename one of them to another topic")]
+    OneTopicForTwo {
+        /// The topic after renaming.
+        topic: String,
+        /// One of the topics in the logs.
+        one: String,
+        /// The other one.
+        other: String,
+    },
     /// A selected robot is not in the logs.
     #[error("there is no robot `{robot}` in the logs: {}", listed(.known))]
     NoSuchRobot {

@@ -16,6 +16,8 @@ struct Draft {
     file: usize,
     number: u16,
     channel: Channel,
+    /// Its topic as the log has it.
+    logged: String,
     /// Whether the user renamed the topic.
     is_renamed: bool,
     /// The robot that its frames are put under.
@@ -46,6 +48,7 @@ pub(super) fn name(
     let robot_of_file: Vec<Option<String>> =
         input_of.iter().map(|&input| of_input.get(input).cloned().flatten()).collect();
     put_under_robots(&mut drafts, &robot_of_file, rules);
+    check_renamed(&drafts)?;
 
     let roles = RobotChannels::new(robots.clone(), drafts.iter().map(|draft| &draft.channel));
     let known = known_robots(&roles, &drafts);
@@ -106,8 +109,9 @@ fn drafts(files: &[LogFile], rules: &NameRules) -> Vec<Draft> {
     let draft = |file: usize, number: u16, channel: Channel| {
         let renamed = rules.renamed(&channel.topic);
         let is_renamed = renamed.is_some();
-        let topic = renamed.unwrap_or_else(|| channel.topic.clone());
-        Draft { file, number, channel: Channel { topic, ..channel }, is_renamed, robot: None }
+        let logged = channel.topic.clone();
+        let topic = renamed.unwrap_or_else(|| logged.clone());
+        Draft { file, number, channel: Channel { topic, ..channel }, logged, is_renamed, robot: None }
     };
     let of_file = |(file, log): (usize, &LogFile)| {
         log.channels().map(|(number, channel)| draft(file, number, channel)).collect::<Vec<_>>()
@@ -135,9 +139,24 @@ fn put_under_robots(drafts: &mut [Draft], robot_of_file: &[Option<String>], rule
         }
         if let Some(topic) = rules.renamed(&channel.topic).filter(|_| !*is_renamed) {
             channel.topic = topic;
+            *is_renamed = true;
         }
         *robot = Some(prefix.to_owned());
     }
+}
+
+/// Transforms of all robots share a topic. Two others with one name would be taken for one: of two maps, each would replace
+/// the other.
+fn check_renamed(drafts: &[Draft]) -> Result<(), NameError> {
+    let mut first: BTreeMap<&str, &Draft> = BTreeMap::new();
+    for draft in drafts.iter().filter(|draft| tf_topic(&draft.channel).is_none()) {
+        let known = first.entry(&draft.channel.topic).or_insert(draft);
+        if known.logged != draft.logged && (known.is_renamed || draft.is_renamed) {
+            let [topic, one, other] = [&draft.channel.topic, &known.logged, &draft.logged].map(String::clone);
+            return Err(NameError::OneTopicForTwo { topic, one, other });
+        }
+    }
+    Ok(())
 }
 
 /// The topic for the transforms of all robots, if the channel carries transforms.

@@ -101,6 +101,25 @@ fn logs_with_equal_topics_and_equal_file_names_are_an_error_with_a_fix() {
 }
 
 #[test]
+fn two_topics_do_not_become_one() {
+    let folder = Folder::new();
+    let maps = [("/robot1/map", OccupancyGrid::NAME), ("/robot2/map", OccupancyGrid::NAME), ("/tf", TFMessage::NAME)];
+    let inputs = inputs(&[log(&folder, "a.mcap", &maps)]);
+    let opened = |renames: &[&str]| {
+        let renames = renames.iter().map(|text| text.parse().unwrap()).collect();
+        open(&inputs, &NameRules { renames, ..Default::default() }, &RobotTopics::default()).map(|_| ())
+    };
+    let together = ["/robot1/map=/x/map", "/robot2/map=/x/map"];
+    for renames in [&["/robot2/map=/robot1/map"][..], &together, &["/{robot}/map=/map"]] {
+        let error = opened(renames).unwrap_err().to_string();
+        assert!(error.starts_with("`/robot1/map` and `/robot2/map` would both be"), "{error}");
+    }
+    // Each gets the name of the other.
+    opened(&["/robot1/map=/robot2/map", "/robot2/map=/robot1/map"]).unwrap();
+    opened(&["/robot1/map=/x/tf", "/robot2/map=/tf"]).unwrap();
+}
+
+#[test]
 fn topics_are_renamed_before_and_after_they_are_put_under_their_robot() {
     let folder = Folder::new();
     let path = log(&folder, "a.mcap", &[("/slam/map", OccupancyGrid::NAME), ("/bot/map", OccupancyGrid::NAME)]);
