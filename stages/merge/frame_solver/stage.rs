@@ -8,7 +8,7 @@ use super::solve::solve;
 use super::tree::Tree;
 use crate::shared::robot_pair::RobotPair;
 use gridweave_runtime::ros::{
-    Alignment, GridError, Header, OccupancyGrid, RobotFrames, TFMessage, UnmergedRobot, Verdict, Verdicts,
+    Alignment, GridError, Header, OccupancyGrid, RobotFrames, TFMessage, TagEstimates, UnmergedRobot, Verdict, Verdicts,
 };
 use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,6 +28,11 @@ pub fn kind() -> StageKind {
         "the robots' maps, for the names of robots and of their map frames; without it the robots are those that \
          alignments name",
         FrameSolver::receive_map,
+    )
+    .optional_input(
+        "tags",
+        "positions of tags in the robots' frames, for the names of the frames of robots without maps",
+        FrameSolver::receive_tags,
     )
     .optional_input("lost", "robots that have no map, with the reason", FrameSolver::receive_lost)
     .input("alignment", "alignments of pairs, accepted and refused ones", FrameSolver::receive_alignment)
@@ -77,6 +82,8 @@ struct FrameSolver {
     robots: BTreeSet<String>,
     /// The robots that have sent a map that can be used.
     mapped: BTreeSet<String>,
+    /// The robots that have sent a map, whose frame is theirs.
+    has_map: BTreeSet<String>,
     /// What is wrong with the maps of robots that have sent none that can be used.
     unusable_maps: BTreeMap<String, GridError>,
     /// Why robots have no map.
@@ -99,6 +106,7 @@ impl FrameSolver {
             wanted: context.reference.clone(),
             robots: BTreeSet::new(),
             mapped: BTreeSet::new(),
+            has_map: BTreeSet::new(),
             unusable_maps: BTreeMap::new(),
             lost: BTreeMap::new(),
             frame_ids: BTreeMap::new(),
@@ -127,6 +135,7 @@ impl FrameSolver {
         let is_new = self.robots.insert(robot.to_owned());
         let is_renamed = self.frame_ids.get(robot) != Some(&frame_id);
         self.frame_ids.insert(robot.to_owned(), frame_id);
+        self.has_map.insert(robot.to_owned());
         let has_changed = match map.check() {
             Ok(()) => {
                 self.mapped.insert(robot.to_owned());
@@ -136,6 +145,18 @@ impl FrameSolver {
             Err(_) => false,
         };
         if is_new || is_renamed || has_changed { self.solve_and_send(output) } else { Ok(()) }
+    }
+
+    /// A robot without a map is in the frame of its tags, which is that of its poses.
+    fn receive_tags(&mut self, tags: Received<'_, TagEstimates>, output: &Output<Placement>) -> Result<(), StageError> {
+        let TagEstimates { robot, header, .. } = tags.into_content();
+        if self.has_map.contains(&robot) || header.frame_id.is_empty() {
+            return Ok(());
+        }
+        let frame_id = prefixed(&robot, &header.frame_id);
+        let before = self.frame_ids.insert(robot.clone(), frame_id.clone());
+        let is_placed = before.as_ref() != Some(&frame_id) && self.robots.contains(&robot);
+        if is_placed { self.solve_and_send(output) } else { Ok(()) }
     }
 
     /// A robot without a map is known, and is not merged.

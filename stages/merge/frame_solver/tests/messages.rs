@@ -31,6 +31,20 @@ fn the_reference_is_exactly_at_the_origin() {
 }
 
 #[test]
+fn a_robot_without_a_map_is_in_the_frame_of_its_tags() {
+    let mut run = Run::new(None);
+    run.tags("robot1", "robot1/odom");
+    run.map("robot2", "map");
+    run.tags("robot2", "odom");
+    assert_eq!(run.frames().len(), 1, "tags alone make no robot known");
+    run.align(&between(1, 2));
+    let frame_ids = |frames: RobotFrames| frames.frames.into_iter().map(|frame| frame.frame_id).collect::<Vec<_>>();
+    assert_eq!(frame_ids(run.solved()), ["robot1/odom", "robot2/map"]);
+    run.tags("robot1", "odom_combined");
+    assert_eq!(frame_ids(run.solved()), ["robot1/odom_combined", "robot2/map"]);
+}
+
+#[test]
 fn another_reference_turns_the_frames_round() {
     let mut run = Run::new(Some("robot2"));
     run.map("robot1", "map");

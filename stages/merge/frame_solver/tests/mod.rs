@@ -8,7 +8,8 @@ use super::kind;
 use crate::shared::geometry::{Pose2, pose, wrap_angle};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{
-    Alignment, Header, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames, TFMessage, UnmergedRobot, Verdict, Verdicts,
+    Alignment, Header, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames, TFMessage, TagEstimates, UnmergedRobot,
+    Verdict, Verdicts,
 };
 use gridweave_runtime::stage::{Context, StageError, StageHarness};
 
@@ -34,6 +35,12 @@ impl Run {
         let info = MapMetaData { resolution, ..Default::default() };
         let map = OccupancyGrid { header: Header::new(LogTime(5), frame_id), info, ..Default::default() };
         self.stage.give::<OccupancyGrid<'_>>("map", robot, LogTime(5), &map).unwrap();
+    }
+
+    fn tags(&mut self, robot: &str, frame_id: &str) {
+        let header = Header::new(LogTime(5), frame_id);
+        let tags = TagEstimates { header, robot: robot.to_owned(), ..Default::default() };
+        self.stage.give::<TagEstimates>("tags", robot, LogTime(5), &tags).unwrap();
     }
 
     fn lost(&mut self, robot: &str, reason: &str) {
