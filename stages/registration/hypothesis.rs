@@ -16,6 +16,8 @@ pub enum Basis {
         /// Peak significance: how much the score exceeds the second-best one, in units of the spread of all others; 0
         /// if it does not. By chance it is more than `t` with probability `exp(-t)`.
         significance: f64,
+        /// By how much the score exceeds what chance reaches with these maps, as a share of it, 0 to 1.
+        margin: f64,
     },
     /// Common tags, enough to confirm each other.
     Tags,
@@ -33,7 +35,7 @@ impl Basis {
         match alignment.source.as_str() {
             MAPS if is_by_search => {
                 let by_chance = (1.0 - alignment.score.clamp(0.0, 1.0)).max(f64::MIN_POSITIVE);
-                Self::Search { significance: -by_chance.ln() }
+                Self::Search { significance: -by_chance.ln(), margin: alignment.margin.clamp(0.0, 1.0) }
             }
             TAGS if alignment.provisional => Self::FewTags,
             TAGS => Self::Tags,
@@ -93,7 +95,7 @@ mod tests {
 
     #[test]
     fn only_the_search_and_tags_have_a_basis_of_their_own() {
-        let Basis::Search { significance } = Basis::of(&alignment("maps", "maps+icp")) else { panic!() };
+        let Basis::Search { significance, .. } = Basis::of(&alignment("maps", "maps+icp")) else { panic!() };
         assert!((significance - 100.0_f64.ln()).abs() < 1e-9);
         assert_eq!(Basis::of(&alignment("tags", "tags+directions+icp")), Basis::Tags);
         assert_eq!(Basis::of(&Alignment { provisional: true, ..alignment("tags", "tags") }), Basis::FewTags);

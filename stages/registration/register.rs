@@ -60,7 +60,7 @@ impl<'a> PreparedPair<'a> {
         Hypothesis {
             transform_a_b: registration.transform_a_b,
             covariance: registration.covariance,
-            basis: Basis::Search { significance: guess.significance.max(0.0) },
+            basis: Basis::Search { significance: guess.significance.max(0.0), margin: guess.margin },
             source: "maps".to_owned(),
             reason: refusal.as_ref().map_or(reason, ToString::to_string),
             is_refused: refusal.is_some(),

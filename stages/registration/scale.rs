@@ -5,7 +5,7 @@
 //! tolerates.
 
 use super::judgement::{UserKnowledge, Verdict};
-use super::search::{MapAlignerParameters, PreparedMap, align_prepared};
+use super::search::{MapAlignerParameters, PreparedMap, peak_significance};
 use super::{PreparedPair, RegistrationParameters, register};
 use crate::shared::geometry::{Grid, GridGeometry};
 use rayon::prelude::*;
@@ -115,8 +115,7 @@ impl<'a> Rasters<'a> {
     /// Peak significance of the best pose with map b larger by a factor; 0 where the maps fit nowhere.
     fn significance(&self, factor: f64) -> f64 {
         let b = PreparedMap::new("", &scaled(self.b, factor), 0.5 * self.search.cell, self.search.max_extent);
-        let found = b.ok().and_then(|b| align_prepared(&self.a, &b, None, &self.search).ok());
-        found.and_then(|found| found.hypotheses.first().map(|best| best.significance)).unwrap_or(0.0)
+        b.map_or(0.0, |b| peak_significance(&self.a, &b, &self.search))
     }
 }
 

@@ -139,6 +139,7 @@ fn result_messages_agree_with_their_definitions() {
         yaw: 3.0,
         covariance,
         score: 0.5,
+        margin: 0.5,
         method: "icp".into(),
         accepted: true,
         provisional: true,

@@ -103,6 +103,8 @@ pub struct Alignment {
     /// The agreement of the maps, 0 to 1, as estimated by the sending stage. A stage that has searched all hypotheses gives
     /// the significance of this one: the probability that it is not the best by chance.
     pub score: f64,
+    /// By how much the maps fit better here than by chance, as a share of how well they fit, 0 to 1. 0 if its stage does not know.
+    pub margin: f64,
     /// The steps by which it was found, as in `tags+directions+icp`; for people.
     pub method: String,
     /// Whether it may be used to merge the maps.

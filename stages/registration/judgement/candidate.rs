@@ -94,12 +94,13 @@ impl Candidate {
 
     /// Values of the terms of the sum.
     pub fn terms(&self) -> Terms {
-        let significance = self.hypotheses().filter_map(|hypothesis| match hypothesis.basis {
-            Basis::Search { significance } => Some(significance),
+        let peaks = self.hypotheses().filter_map(|hypothesis| match hypothesis.basis {
+            Basis::Search { significance, margin } => Some((significance, margin)),
             Basis::Tags | Basis::FewTags | Basis::Unknown => None,
         });
+        let highest = |one: (f64, f64), other: (f64, f64)| (one.0.max(other.0), one.1.max(other.1));
         let cost = self.deformed.map_or(0.0, |deformed| deformed.cost);
-        Terms::new(significance.fold(0.0, f64::max), self.deviation(), &self.agreement, cost)
+        Terms::new(peaks.fold((0.0, 0.0), highest), self.deviation(), &self.agreement, cost)
     }
 
     /// Largest standard deviation of the centroid of the inliers over all directions, metres.

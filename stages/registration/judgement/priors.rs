@@ -17,7 +17,7 @@ const BY_COINCIDENCE: f64 = 4.6;
 pub(super) fn prior(candidate: &Candidate, is_expected: bool) -> f64 {
     let has_tags = candidate.rests_on(|basis| basis == Basis::Tags);
     let is_best_peak =
-        candidate.rests_on(|basis| matches!(basis, Basis::Search { significance } if significance > 0.0));
+        candidate.rests_on(|basis| matches!(basis, Basis::Search { significance, .. } if significance > 0.0));
     let by_tags = if candidate.rests_on(Basis::is_by_tags) { BY_TAGS } else { 0.0 };
     let by_coincidence = if has_tags && is_best_peak { BY_COINCIDENCE } else { 0.0 };
     by_tags + by_coincidence + if is_expected { BY_INITIAL_POSES } else { 0.0 }

@@ -140,6 +140,12 @@ impl Refusal {
                 let Agreement { inlier_length, .. } = agreement;
                 format!("{inlier_length:.0} m of wall agree, and nearly as much at other poses: it may be chance")
             }
+            Self::Chance { agreement, weakest: Term::MarginOverChance, .. } => {
+                let Agreement { inlier_length, .. } = agreement;
+                format!(
+                    "{inlier_length:.0} m of wall agree, and nearly as much would if one map were mirrored: it may be chance"
+                )
+            }
             Self::Chance { agreement, .. } => {
                 let Agreement { inlier_length, conflict_length, .. } = agreement;
                 format!("{inlier_length:.0} m of wall agree and {conflict_length:.0} m contradict, which may be chance")

@@ -198,7 +198,7 @@ mod tests {
         let hypothesis = Hypothesis {
             transform_a_b: *place,
             covariance: Matrix3::identity(),
-            basis: Basis::Search { significance: 30.0 },
+            basis: Basis::Search { significance: 30.0, margin: 0.8 },
             source: "maps".to_owned(),
             reason: String::new(),
             is_refused: false,

@@ -17,13 +17,15 @@ const MORE_CONFLICT: f64 = 5.0;
 const MORE_WALL: f64 = 40.0;
 
 /// The number of terms.
-pub const COUNT: usize = 10;
+pub const COUNT: usize = 11;
 
 /// A term of the log-odds that a hypothesis is right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Term {
     /// Logarithm of the peak significance.
     PeakSignificance,
+    /// Margin of the peak over what chance reaches, as a share of it.
+    MarginOverChance,
     /// Logarithm of the largest standard deviation of the position over all directions, metres.
     Deviation,
     /// Logarithm of the ratio of inlier length to crossing length.
@@ -48,6 +50,7 @@ impl Term {
     /// All terms, in the order of [`Terms`].
     pub const ALL: [Self; COUNT] = [
         Self::PeakSignificance,
+        Self::MarginOverChance,
         Self::Deviation,
         Self::InliersToCrossings,
         Self::CommonArea,
@@ -63,6 +66,7 @@ impl Term {
     pub fn name(self) -> &'static str {
         match self {
             Self::PeakSignificance => "peak significance",
+            Self::MarginOverChance => "margin over chance",
             Self::Deviation => "standard deviation of the position",
             Self::InliersToCrossings => "inliers to walls through free space",
             Self::CommonArea => "common area",
@@ -79,6 +83,7 @@ impl Term {
     pub fn sign(self) -> f64 {
         match self {
             Self::PeakSignificance
+            | Self::MarginOverChance
             | Self::InliersToCrossings
             | Self::CommonArea
             | Self::IndependentInliers
@@ -93,9 +98,14 @@ impl Term {
 pub struct Terms(pub [f64; COUNT]);
 
 impl Terms {
-    /// Terms of a hypothesis with a peak significance, the standard deviation of its position, metres, the agreement
+    /// Terms of a hypothesis with a peak significance and a margin over chance, the standard deviation of its position, metres, the agreement
     /// of the maps, and the cost of the deformation of map b.
-    pub fn new(significance: f64, deviation: f64, agreement: &Agreement, deformation_cost: f64) -> Self {
+    pub fn new(
+        (significance, margin): (f64, f64),
+        deviation: f64,
+        agreement: &Agreement,
+        deformation_cost: f64,
+    ) -> Self {
         let Agreement {
             overlap,
             inlier_length,
@@ -109,6 +119,7 @@ impl Terms {
         let confirmed = (independent_share / FULL_SHARE).min(1.0);
         Self([
             confirmed * significance.clamp(0.0, MOST_SIGNIFICANCE).ln_1p(),
+            margin.clamp(0.0, 1.0),
             (LEAST_DEVIATION + deviation).min(1.0).ln(),
             confirmed * ((1.0 + inlier_length) / (1.0 + crossing_length)).ln(),
             confirmed * overlap.clamp(1.0, MOST_AREA).ln(),

@@ -102,9 +102,11 @@ impl Verdict {
     /// The term by which the candidate is most below a usual right hypothesis.
     pub(super) fn weakest_term(&self) -> Term {
         let terms = self.candidate.terms();
-        // A hypothesis that is not from a search has no peak significance.
+        // A hypothesis that is not from a search has no peak.
         let is_by_search = self.candidate.rests_on(|basis| matches!(basis, Basis::Search { .. }));
-        let counts = |index: &usize| is_by_search || Term::ALL[*index] != Term::PeakSignificance;
+        let counts = |index: &usize| {
+            is_by_search || !matches!(Term::ALL[*index], Term::PeakSignificance | Term::MarginOverChance)
+        };
         let shortfall = |index: &usize| WEIGHTS[*index] * (TYPICAL[*index] - terms.0[*index]);
         let weakest =
             (0..WEIGHTS.len()).filter(counts).max_by(|one, other| shortfall(one).total_cmp(&shortfall(other)));

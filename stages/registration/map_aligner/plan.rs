@@ -165,14 +165,15 @@ impl MergePlan {
             }
         };
         let is_clear = found.second_best_share <= self.parameters.tie_second_best && self.agrees_in_much(&found);
-        let MapAlignment { transform_a_b: best, significance, .. } = *found.hypotheses.first()?;
+        let on_merged = found.hypotheses.first()?;
+        let best = on_merged.transform_a_b;
         if count_a + count_b == 2 {
             reports.push(PairReport::of(pair, Ok(with_reasons(&found))));
             return is_clear.then(|| self.groups.unite(first, second, &best)).flatten();
         }
         let pairs = self.pairs_in_common(group_a, group_b, &best);
         if is_clear {
-            let reported = pairs.iter().filter_map(|pair| self.predicted(pair, count_a.max(count_b), significance));
+            let reported = pairs.iter().filter_map(|pair| self.predicted(pair, count_a.max(count_b), on_merged));
             let reported = reported.map(|reported| PairReport { is_supported: true, ..reported });
             let reported: Vec<PairReport> = reported.take(1 + self.parameters.predictions).collect();
             self.predictions += reported.len() as u64;
@@ -237,15 +238,15 @@ impl MergePlan {
         Some(PairReport::of(pair.clone(), found))
     }
 
-    /// Hypothesis of a pair of robots from the relative pose of their groups. The peak significance is that of the
-    /// search of the groups.
+    /// Hypothesis of a pair of robots from the relative pose of their groups. The peak significance and the margin
+    /// are those of the search of the groups.
     fn predicted(
         &self,
         PairInCommon { pair, transform_a_b, .. }: &PairInCommon,
         others: usize,
-        significance: f64,
+        on_merged: &MapAlignment,
     ) -> Option<PairReport> {
-        let found = align_near(self.map(&pair.a)?, self.map(&pair.b)?, transform_a_b, significance, &self.parameters)?;
+        let found = align_near(self.map(&pair.a)?, self.map(&pair.b)?, transform_a_b, on_merged, &self.parameters)?;
         if found.wall_in_common < self.parameters.min_wall_length {
             return None;
         }
@@ -280,7 +281,7 @@ impl MergePlan {
             let (map_a, map_b) = (self.map(&report.pair.a)?, self.map(&report.pair.b)?);
             let mut refined = Vec::new();
             for (before, reason) in found {
-                let again = align_near(map_a, map_b, &before.transform_a_b, before.significance, &self.parameters)?;
+                let again = align_near(map_a, map_b, &before.transform_a_b, before, &self.parameters)?;
                 if again.score < KEPT_SCORE * before.score {
                     return None;
                 }

@@ -78,6 +78,7 @@ impl MapAligner {
             let mut alignment = Alignment {
                 covariance: row_by_row(&found.covariance),
                 score: 1.0 - (-found.significance.max(0.0)).exp(),
+                margin: found.margin,
                 accepted: true,
                 provisional: self.provisional && !report.is_supported,
                 rank,

@@ -1,5 +1,6 @@
 //! Searches the relative poses of two maps, and refines the peaks to hypotheses.
 
+use super::chance::{chance_score, margin};
 use super::peaks::{change, is_near, overlay};
 use super::prepared_map::JUDGED;
 use super::significance::{OTHERS, significance};
@@ -31,6 +32,8 @@ pub struct MapAlignment {
     /// Peak significance: how much the score exceeds the second-best one elsewhere, in units of the spread of all
     /// others; below 0 if it does not. By chance it is more than `t` with probability `exp(-t)`.
     pub significance: f64,
+    /// By how much the score exceeds what chance reaches with these maps, as a share of it, 0 to 1.
+    pub margin: f64,
     /// Approximate inlier length, metres.
     pub wall_in_common: f64,
     /// Share of the walls of map b that meet walls, and not free space, of map a, 0 to 1.
@@ -98,7 +101,7 @@ pub fn align_prepared(
     let peaks = Peaks::find(a, b, Extent::of(window), parameters);
     let no_fit = || if window.is_some() { SearchRefusal::NoFitInWindow } else { SearchRefusal::NoFit };
     let best = peaks.all().first().ok_or_else(no_fit)?;
-    let hypotheses = hypotheses(&peaks, best.score, a, b, parameters);
+    let mut hypotheses = hypotheses(&peaks, best.score, a, b, parameters);
     let best_found = hypotheses.first().ok_or_else(no_fit)?;
     let (length, least) = (best_found.alignment.wall_in_common, parameters.min_wall_length);
     if length < least {
@@ -106,12 +109,24 @@ pub fn align_prepared(
     }
     let centre = &best_found.common.centre;
     let elsewhere = peaks.best_elsewhere(&best.transform_a_b, centre, parameters);
+    let second_best_change =
+        elsewhere.map_or((0.0, 0.0), |pose| change(&best.transform_a_b, &pose.transform_a_b, centre));
+    let by_chance = chance_score(a, b, best, elsewhere, parameters);
+    hypotheses.iter_mut().for_each(|found| found.alignment.margin = margin(found.alignment.score, by_chance));
     Ok(MapAlignments {
         second_best_share: elsewhere.map_or(0.0, |pose| (pose.score / best.score).min(1.0)),
-        second_best_change: elsewhere
-            .map_or((0.0, 0.0), |pose| change(&best.transform_a_b, &pose.transform_a_b, centre)),
+        second_best_change,
         hypotheses: hypotheses.into_iter().map(|found| found.alignment).collect(),
     })
+}
+
+/// Peak significance of the best pose of map b in map a, of two maps in cells of the same size; 0 where they fit nowhere.
+pub fn peak_significance(a: &PreparedMap, b: &PreparedMap, parameters: &MapAlignerParameters) -> f64 {
+    let peaks = Peaks::find(a, b, Extent::All, parameters);
+    let Some(best) = peaks.all().first() else { return 0.0 };
+    let best = hypotheses(&peaks, best.score, a, b, parameters).into_iter().next();
+    let is_enough = |found: &Hypothesis| found.alignment.wall_in_common >= parameters.min_wall_length;
+    best.filter(is_enough).map_or(0.0, |found| found.alignment.significance)
 }
 
 /// The best poses of a map on itself, other than the identity: `T_map_map` of poses at which the building may be
@@ -136,22 +151,22 @@ pub fn self_similar_poses(
 }
 
 /// Hypothesis at the peak near a given pose, without a search. `None` if the walls of the maps do not meet there, or
-/// contradict each other as much. `significance` is that of the search in which it was found.
+/// contradict each other as much. `found` is what its peak significance and its margin were when it was found.
 pub fn align_near(
     a: &PreparedMap,
     b: &PreparedMap,
     transform_a_b: &Pose2,
-    significance: f64,
+    found: &MapAlignment,
     parameters: &MapAlignerParameters,
 ) -> Option<MapAlignment> {
     let judged = overlay(a, b, JUDGED, parameters.free_space_penalty);
     let common = judged.common_walls(transform_a_b)?;
     let peak = ScoredPose { transform_a_b: *transform_a_b, score: judged.faced_score(transform_a_b) };
-    let mut found = Hypothesis::at(&peak, 1.0, &common, a, b, parameters)?.alignment;
-    found.score = judged.faced_score(&found.transform_a_b);
-    found.share = 1.0;
-    found.significance = significance;
-    (found.score > 0.0).then_some(found)
+    let mut near = Hypothesis::at(&peak, 1.0, &common, a, b, parameters)?.alignment;
+    near.score = judged.faced_score(&near.transform_a_b);
+    near.share = 1.0;
+    (near.significance, near.margin) = (found.significance, found.margin);
+    (near.score > 0.0).then_some(near)
 }
 
 /// Hypotheses at the peaks, each apart from the others, the best first.
@@ -243,6 +258,7 @@ impl Hypothesis {
             score: peak.score,
             share: peak.score / best_score,
             significance: 0.0,
+            margin: 0.0,
             wall_in_common: common.length,
             wall_agreement: common.agreement,
         };

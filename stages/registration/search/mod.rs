@@ -14,6 +14,7 @@
 //! - [`align_maps`]: all of it.
 
 mod align;
+mod chance;
 mod coordinate_ascent;
 mod correlation;
 mod exhaustive;
@@ -34,7 +35,10 @@ mod walk;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use align::{MapAlignment, MapAlignments, NamedMap, align_maps, align_near, align_prepared, self_similar_poses};
+pub use align::{
+    MapAlignment, MapAlignments, NamedMap, align_maps, align_near, align_prepared, peak_significance,
+    self_similar_poses,
+};
 pub use coordinate_ascent::{Steps, coordinate_ascent, refine_peak};
 pub use correlation::{Correlator, ScoredShift, Workspace};
 pub use exhaustive::{Rotations, ScoredPose, search};

@@ -56,6 +56,11 @@ impl PreparedMap {
         Self { levels, walls, few_walls }
     }
 
+    /// Its mirror image.
+    pub(super) fn mirrored(&self) -> Self {
+        Self::of_raster(self.levels[0].mirrored())
+    }
+
     /// The raster whose cells are `2 ^ number` times as wide as those of the finest, or the widest one.
     pub fn level(&self, number: usize) -> &Raster {
         &self.levels[number.min(LEVELS - 1)]

@@ -106,6 +106,13 @@ impl Raster {
         halved
     }
 
+    /// Its mirror image at the y axis.
+    pub(super) fn mirrored(&self) -> Self {
+        let corner = Vector2::new(-(self.corner.x + self.width as f64 * self.cell), self.corner.y);
+        let rows = self.cells.chunks(self.width.max(1));
+        Self { corner, cells: rows.flat_map(|row| row.iter().rev().copied()).collect(), ..*self }
+    }
+
     /// Union of several maps, each with its transform to the common frame. A cell is wall if it is wall in any of
     /// them. Cells are as wide as those of the first. `None` if the maps are so far apart that they cannot be
     /// connected, as the memory depends on that distance, and not on the known area.

@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 /// The probabilities at which merges are counted.
-const ACCEPT: [f64; 4] = [0.9, 0.99, 0.999, 0.9999];
+const ACCEPT: [f64; 4] = [0.9, 0.95, 0.98, 0.99];
 
 /// Writes what came of each set, and what probabilities mean.
 pub(super) fn report(examples: &[Example], judged: &[Judged], results: &mut Results) -> Result<()> {

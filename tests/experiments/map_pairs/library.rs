@@ -5,7 +5,7 @@ use crate::align::worlds::{self, PairWorld, Seeds};
 use crate::log::last_maps;
 use crate::map_pairs::truth::Closeness;
 use anyhow::{Context, Result};
-use gridweave_logs::map_file::{GridMap, load};
+use gridweave_logs::map_file::{GridMap, Thresholds, load_as};
 use gridweave_runtime::ros::Time;
 use gridweave_runtime::stage::Registry;
 use gridweave_stages::shared::geometry::{Grid, GridGeometry, Pose2, UNKNOWN, is_known, pose};
@@ -45,7 +45,9 @@ impl MapOfBuilding {
 
     /// The map in a file.
     pub(crate) fn of_file(yaml: &Path) -> Result<Self> {
-        let map = load(yaml).with_context(|| format!("cannot read {}", yaml.display()))?;
+        // As the stage `map_file_source` reads it.
+        let (map, _) =
+            load_as(yaml, Thresholds::ByPicture).with_context(|| format!("cannot read {}", yaml.display()))?;
         Ok(Self::new(yaml.file_stem().unwrap_or_default().to_string_lossy().into_owned(), map))
     }
 
