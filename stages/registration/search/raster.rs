@@ -257,6 +257,20 @@ mod tests {
     }
 
     #[test]
+    fn a_mirror_image_has_at_each_point_what_the_map_has_at_the_opposite_one() {
+        let (geometry, cells) = map(0.3);
+        let raster = Raster::new(&Grid::new(geometry, &cells).unwrap(), 0.2, 100.0).unwrap();
+        let mirrored = raster.mirrored();
+        for row in 0..raster.height {
+            for column in 0..raster.width {
+                let centre = raster.centre(column, row);
+                assert_eq!(mirrored.at(&Point2::new(-centre.x, centre.y)), raster.at(&centre));
+            }
+        }
+        assert_ne!(mirrored.cells, raster.cells);
+    }
+
+    #[test]
     fn a_union_holds_the_cells_of_its_maps() {
         let (geometry, cells) = map(0.0);
         let raster = Raster::new(&Grid::new(geometry, &cells).unwrap(), 0.1, 100.0).unwrap();
