@@ -212,12 +212,15 @@ fn a_tap_whose_wire_is_cut_is_closed_at_the_robot_and_goes_on_when_it_is_restore
         );
         assert_eq!(viewers(), 1);
         wire.cut();
-        assert_eq!(go_on(&mut tap, "close", |_| viewers() == 0), None);
+        // On a wire that is restored before, Zenoh connects again by itself.
+        let is_noticed = |tap: &mut StageHarness| {
+            viewers() == 0 && tap.warnings().keys().any(|text| text.contains("is lost: it is retried"))
+        };
+        assert_eq!(go_on(&mut tap, "close", is_noticed), None);
         wire.restore();
     }
     assert_eq!(came, [1, 2, 3]);
     let warnings = tap.warnings();
-    assert!(warnings.keys().any(|text| text.contains("is lost: it is retried")), "{warnings:?}");
     assert_eq!(warnings["`slam.pose` was reopened: messages may have been missed"], 2, "{warnings:?}");
     let is_told = |tap: &mut StageHarness| tap.counts().get("messages missed") == Some(&(3 * MISSED));
     assert_eq!(go_on(&mut tap, "missed", is_told), None);
