@@ -34,8 +34,11 @@ impl Basis {
         let is_by_search = alignment.hypotheses > 0 && alignment.method.split('+').next() == Some(MAPS);
         match alignment.source.as_str() {
             MAPS if is_by_search => {
-                let by_chance = (1.0 - alignment.score.clamp(0.0, 1.0)).max(f64::MIN_POSITIVE);
-                Self::Search { significance: -by_chance.ln(), margin: alignment.margin.clamp(0.0, 1.0) }
+                // What is not a number is no evidence.
+                let [score, margin] = [alignment.score, alignment.margin]
+                    .map(|value| if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) });
+                let by_chance = (1.0 - score).max(f64::MIN_POSITIVE);
+                Self::Search { significance: -by_chance.ln(), margin }
             }
             TAGS if alignment.provisional => Self::FewTags,
             TAGS => Self::Tags,
@@ -97,6 +100,8 @@ mod tests {
     fn only_the_search_and_tags_have_a_basis_of_their_own() {
         let Basis::Search { significance, .. } = Basis::of(&alignment("maps", "maps+icp")) else { panic!() };
         assert!((significance - 100.0_f64.ln()).abs() < 1e-9);
+        let unknown = Alignment { score: f64::NAN, margin: f64::NAN, ..alignment("maps", "maps") };
+        assert_eq!(Basis::of(&unknown), Basis::Search { significance: 0.0, margin: 0.0 });
         assert_eq!(Basis::of(&alignment("tags", "tags+directions+icp")), Basis::Tags);
         assert_eq!(Basis::of(&Alignment { provisional: true, ..alignment("tags", "tags") }), Basis::FewTags);
         for (source, method) in [("maps", "radon"), ("topology", "topology"), ("a plug-in", "tags"), ("", "")] {

@@ -82,8 +82,6 @@ struct FrameSolver {
     robots: BTreeSet<String>,
     /// The robots that have sent a map that can be used.
     mapped: BTreeSet<String>,
-    /// The robots that have sent a map, whose frame is theirs.
-    has_map: BTreeSet<String>,
     /// What is wrong with the maps of robots that have sent none that can be used.
     unusable_maps: BTreeMap<String, GridError>,
     /// Why robots have no map.
@@ -106,7 +104,6 @@ impl FrameSolver {
             wanted: context.reference.clone(),
             robots: BTreeSet::new(),
             mapped: BTreeSet::new(),
-            has_map: BTreeSet::new(),
             unusable_maps: BTreeMap::new(),
             lost: BTreeMap::new(),
             frame_ids: BTreeMap::new(),
@@ -135,7 +132,6 @@ impl FrameSolver {
         let is_new = self.robots.insert(robot.to_owned());
         let is_renamed = self.frame_ids.get(robot) != Some(&frame_id);
         self.frame_ids.insert(robot.to_owned(), frame_id);
-        self.has_map.insert(robot.to_owned());
         let has_changed = match map.check() {
             Ok(()) => {
                 self.mapped.insert(robot.to_owned());
@@ -150,7 +146,8 @@ impl FrameSolver {
     /// A robot without a map is in the frame of its tags, which is that of its poses.
     fn receive_tags(&mut self, tags: Received<'_, TagEstimates>, output: &Output<Placement>) -> Result<(), StageError> {
         let TagEstimates { robot, header, .. } = tags.into_content();
-        if self.has_map.contains(&robot) || header.frame_id.is_empty() {
+        let has_map = self.mapped.contains(&robot) || self.unusable_maps.contains_key(&robot);
+        if has_map || header.frame_id.is_empty() {
             return Ok(());
         }
         let frame_id = prefixed(&robot, &header.frame_id);

@@ -142,9 +142,7 @@ impl Refusal {
             }
             Self::Chance { agreement, weakest: Term::MarginOverChance, .. } => {
                 let Agreement { inlier_length, .. } = agreement;
-                format!(
-                    "{inlier_length:.0} m of wall agree, and nearly as much would if one map were mirrored: it may be chance"
-                )
+                format!("{inlier_length:.0} m of wall agree, which is little more than walls like these do by chance")
             }
             Self::Chance { agreement, .. } => {
                 let Agreement { inlier_length, conflict_length, .. } = agreement;

@@ -119,7 +119,7 @@ impl Terms {
         let confirmed = (independent_share / FULL_SHARE).min(1.0);
         Self([
             confirmed * significance.clamp(0.0, MOST_SIGNIFICANCE).ln_1p(),
-            margin.clamp(0.0, 1.0),
+            margin,
             (LEAST_DEVIATION + deviation).min(1.0).ln(),
             confirmed * ((1.0 + inlier_length) / (1.0 + crossing_length)).ln(),
             confirmed * overlap.clamp(1.0, MOST_AREA).ln(),
