@@ -8,6 +8,7 @@ use super::judgement::{UserKnowledge, Verdict};
 use super::search::{MapAlignerParameters, PreparedMap, peak_significance};
 use super::{PreparedPair, RegistrationParameters, register};
 use crate::shared::geometry::{Grid, GridGeometry};
+use crate::shared::walls::DEVIATION;
 use rayon::prelude::*;
 
 /// Bounds of the step between the factors that are tried: with fewer the time of large maps is bounded, whose ends then move
@@ -51,12 +52,13 @@ impl Scale {
         let is_within = |factor: f64| factor.ln().abs() <= (1.0 + range).ln();
         let at = |factor: f64| is_within(factor).then(|| Self::at(a, b, factor, tried, parameters))?;
         let better = |one: Self, other: Self| if other.log_odds() > one.log_odds() { other } else { one };
+        let sharper = |one: Self, other: Self| if other.precision() > one.precision() { other } else { one };
         let mut best = order.iter().take(LOOKED_AT).filter_map(|number| at(factors[*number])).reduce(better)?;
         let mut step = 0.5 * step;
         while step > FINEST_STEP {
             let (smaller, larger) = rayon::join(|| at(best.factor * (-step).exp()), || at(best.factor * step.exp()));
             let last = best.factor;
-            best = [smaller, larger].into_iter().flatten().fold(best, better);
+            best = [smaller, larger].into_iter().flatten().fold(best, sharper);
             step = if best.factor == last { 0.5 * step } else { step };
         }
         (best.factor.ln().abs() > LEAST_ERROR).then_some(best)
@@ -65,6 +67,12 @@ impl Scale {
     /// Log-odds of the maps at this scale, before they are compared with those of other poses.
     fn log_odds(&self) -> f64 {
         self.verdict.candidate.terms().log_odds()
+    }
+
+    /// Precision of the walls that agree: their length over the variance of where they are drawn.
+    fn precision(&self) -> f64 {
+        let agreement = &self.verdict.candidate.agreement;
+        agreement.inlier_length / (DEVIATION.powi(2) + agreement.residual.powi(2))
     }
 
     /// Registers the maps with map b larger by a factor. `None` if it is not more probable than not that they agree, where

@@ -1,6 +1,7 @@
 //! How well two maps agree where both know something.
 
 use super::ComparisonParameters;
+use super::Details;
 use super::conflicts::points_of_walls;
 use super::regions::{ComparedWall, Finding, Found, Region, RegionComparison};
 use super::straight_walls::StraightWalls;
@@ -74,6 +75,8 @@ pub struct Agreement {
     pub residual: f64,
     /// Centroid of the inliers of map b, frame a; the origin if there are none.
     pub centre: Point2,
+    /// Agreement of the details, a part of the lengths.
+    pub details: Details,
 }
 
 impl Agreement {
@@ -122,6 +125,7 @@ pub fn compare(
         constraints,
         residual: residual(&regions),
         centre: centroid(&on_wall),
+        details: Details::of(a, b, &compared),
         ..Default::default()
     };
     for region in &regions {

@@ -9,10 +9,12 @@
 mod agreement;
 mod conflicts;
 mod deformed;
+mod details;
 mod parameters;
 mod regions;
 mod straight_walls;
 
 pub use agreement::{Agreement, MapView, compare, overlap};
 pub use deformed::Deformed;
+pub use details::{Details, WallLengths};
 pub use parameters::ComparisonParameters;

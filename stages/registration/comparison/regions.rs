@@ -43,6 +43,8 @@ pub(super) struct Found {
 pub(super) struct ComparedWall {
     /// Whether it is a wall of map b.
     pub(super) of_b: bool,
+    /// Index of the point among the walls of its map.
+    pub(super) index: usize,
     /// Position, frame a.
     pub(super) point: Point2,
     /// Unit normal of the wall, frame a; zero where the wall has no direction.
@@ -108,11 +110,19 @@ impl RegionComparison {
         let shifted = Pose2::from_parts((transform_a_b.translation.vector + shift).into(), transform_a_b.rotation);
         let mut region = Region { shift: shift.norm(), ..Region::default() };
         let mut record = |wall: ComparedWall| found.walls.push(wall);
-        self.add(&part.of_b, b, a, &shifted, &mut region, |own, normal, finding| {
-            record(ComparedWall { of_b: true, point: shifted * own, normal: shifted.rotation * normal, finding });
+        self.add(&part.of_b, b, a, &shifted, &mut region, |index, finding| {
+            let (point, normal) = (b.walls.walls.points()[index], b.walls.normals[index]);
+            record(ComparedWall {
+                of_b: true,
+                index,
+                point: shifted * point,
+                normal: shifted.rotation * normal,
+                finding,
+            });
         });
-        self.add(&part.of_a, a, b, &shifted.inverse(), &mut region, |own, normal, finding| {
-            record(ComparedWall { of_b: false, point: own, normal, finding });
+        self.add(&part.of_a, a, b, &shifted.inverse(), &mut region, |index, finding| {
+            let (point, normal) = (a.walls.walls.points()[index], a.walls.normals[index]);
+            record(ComparedWall { of_b: false, index, point, normal, finding });
         });
         found.regions.push(region);
     }
@@ -151,7 +161,7 @@ impl RegionComparison {
         map: &MapView<'_>,
         transform: &Pose2,
         region: &mut Region,
-        mut record: impl FnMut(Point2, Vector2<f64>, Finding),
+        mut record: impl FnMut(usize, Finding),
     ) {
         // Both directions are summed, so each counts one half.
         let length = 0.5 * other.walls.spacing;
@@ -165,7 +175,7 @@ impl RegionComparison {
             let runs_alike = |wall: usize| turned.dot(&map.walls.normals[wall]).abs() >= LEAST_NORMAL_AGREEMENT;
             if let Some(partner) = map.walls.walls.nearest(&point, self.tolerance) {
                 if !runs_alike(partner.index) {
-                    record(own, normal, Finding::Neither);
+                    record(index, Finding::Neither);
                     continue;
                 }
                 let is_seen_from = |side: f64| {
@@ -174,15 +184,15 @@ impl RegionComparison {
                 };
                 if is_seen_from(1.0) || is_seen_from(-1.0) {
                     region.inlier_length += length;
-                    record(own, normal, Finding::Inlier);
+                    record(index, Finding::Inlier);
                 } else {
-                    record(own, normal, Finding::Neither);
+                    record(index, Finding::Neither);
                 }
             } else if is_free(map.value_at(&point)) {
                 region.conflict_length += length;
                 let beside = map.walls.walls.nearest(&point, self.tolerance + BESIDE);
                 let is_beside = beside.is_some_and(|partner| runs_alike(partner.index));
-                record(own, normal, if is_beside { Finding::Beside } else { Finding::Conflict });
+                record(index, if is_beside { Finding::Beside } else { Finding::Conflict });
             }
         }
     }

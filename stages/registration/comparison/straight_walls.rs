@@ -147,6 +147,7 @@ mod tests {
         let count = (along.norm() / SPACING).round() as usize;
         let point = |index: usize| ComparedWall {
             of_b: true,
+            index,
             point: from + along * (index as f64 / count as f64),
             normal,
             finding: Finding::Inlier,

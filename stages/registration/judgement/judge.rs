@@ -203,7 +203,8 @@ fn refusal(verdict: &Verdict, parameters: &JudgementParameters) -> Option<Refusa
     }
     let agreement = candidate.agreement;
     Some(match verdict.weakest_term() {
-        Term::Residual | Term::InliersToCrossings | Term::CrossingConflicts | Term::Crossings => {
+        Term::Residual | Term::CrossingConflicts => Refusal::Contradiction { agreement },
+        Term::SmallComponents | Term::ShortSegments if agreement.details.contradict() => {
             Refusal::Contradiction { agreement }
         }
         weakest => Refusal::Chance { agreement, weakest, probability: *probability, accept },

@@ -1,11 +1,13 @@
 //! Why two maps are not merged.
 
 use super::{Alias, Candidate, Term};
-use crate::registration::comparison::Agreement;
+use crate::registration::comparison::{Agreement, WallLengths};
 use std::fmt;
 
 /// Maps with a lesser inlier length, metres, are described as having nothing in common.
 const LITTLE_WALL: f64 = 4.0;
+/// Maps with a greater inlier ratio, which contradict each other all the same, do so in details.
+const MOST_OF_THE_WALLS: f64 = 0.7;
 
 /// Why an alignment may not be used. The texts are for the user: [`headline`](Self::headline) and
 /// [`advice`](Self::advice) are short, and the display text has all details.
@@ -150,6 +152,14 @@ impl Refusal {
             }
             Self::Contradiction { agreement } if agreement.inlier_length < LITTLE_WALL => {
                 "at no pose do the maps agree on more than a few metres of wall".to_owned()
+            }
+            Self::Contradiction { agreement }
+                if agreement.details.contradict() && agreement.inlier_ratio() >= MOST_OF_THE_WALLS =>
+            {
+                let WallLengths { inlier, conflict } = agreement.details.segments;
+                format!(
+                    "the long walls agree, but of furniture and short walls {inlier:.0} m do, {conflict:.0} m do not"
+                )
             }
             Self::Contradiction { agreement } => {
                 let Agreement { inlier_length, conflict_length, .. } = agreement;

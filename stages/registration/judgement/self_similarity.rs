@@ -78,7 +78,7 @@ pub struct Alias {
     /// Agreement of the self-similar map with itself.
     pub itself: Agreement,
     /// Terms of the log-odds, after the 1 of the first weight.
-    pub terms: [f64; 2],
+    pub terms: [f64; 3],
     /// Log-odds that the alias is right and not the accepted pose.
     pub log_odds: f64,
 }
@@ -119,8 +119,12 @@ impl Alias {
                 return None;
             }
             let by_contradiction = by_contradiction(&here, &there, itself);
-            let terms = [extent(&here, itself), by_contradiction.clamp(-MOST_CONTRADICTION, MOST_CONTRADICTION)];
-            let log_odds = ALIAS[0] + ALIAS[1] * terms[0] + ALIAS[2] * terms[1];
+            let terms = [
+                extent(&here, itself),
+                by_contradiction.clamp(-MOST_CONTRADICTION, MOST_CONTRADICTION),
+                by_details(&there) - by_details(&here),
+            ];
+            let log_odds = ALIAS[0] + ALIAS[1..].iter().zip(terms).map(|(weight, term)| weight * term).sum::<f64>();
             Some(Self { shift, turn, transform_a_b, there, itself: *itself, terms, log_odds })
         };
         by_a.chain(by_b).filter_map(alias).collect()
@@ -135,6 +139,11 @@ fn is_alike(agreement: &Agreement) -> bool {
 /// Logarithm of the self-similar length as a share of the inliers: self-similarity must explain all of them.
 fn extent(here: &Agreement, itself: &Agreement) -> f64 {
     ((itself.inlier_length + 1.0) / (here.inlier_length + 1.0)).ln().min(0.0)
+}
+
+/// How far the details agree.
+fn by_details(agreement: &Agreement) -> f64 {
+    agreement.details.components.log_ratio() + agreement.details.segments.log_ratio()
 }
 
 /// Pose near a guess at which the walls of the maps are aligned.

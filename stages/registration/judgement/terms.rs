@@ -11,10 +11,8 @@ const MOST_SIGNIFICANCE: f64 = 300.0;
 const LEAST_DEVIATION: f64 = 0.01;
 /// A larger common area is no further evidence, square metres.
 const MOST_AREA: f64 = 500.0;
-/// Lengths of conflicts and of inliers that are added before taking the ratio, metres: a share of little wall is
-/// uncertain.
+/// Added to the length of conflicts before taking a share of it, metres: a share of little wall is uncertain.
 const MORE_CONFLICT: f64 = 5.0;
-const MORE_WALL: f64 = 40.0;
 
 /// The number of terms.
 pub const COUNT: usize = 11;
@@ -28,8 +26,6 @@ pub enum Term {
     MarginOverChance,
     /// Logarithm of the largest standard deviation of the position over all directions, metres.
     Deviation,
-    /// Logarithm of the ratio of inlier length to crossing length.
-    InliersToCrossings,
     /// Logarithm of the area that both maps know.
     CommonArea,
     /// Share of the inliers outside the two walls that fix the pose.
@@ -40,8 +36,10 @@ pub enum Term {
     Residual,
     /// Share of the conflict length that crosses free space.
     CrossingConflicts,
-    /// Share of the compared length that crosses free space.
-    Crossings,
+    /// Logarithm of the ratio of inliers to conflicts of small connected components.
+    SmallComponents,
+    /// Logarithm of the ratio of inliers to conflicts of short straight segments.
+    ShortSegments,
     /// Root of the cost of the deformation.
     Deformation,
 }
@@ -52,13 +50,13 @@ impl Term {
         Self::PeakSignificance,
         Self::MarginOverChance,
         Self::Deviation,
-        Self::InliersToCrossings,
         Self::CommonArea,
         Self::IndependentInliers,
         Self::Constraints,
         Self::Residual,
         Self::CrossingConflicts,
-        Self::Crossings,
+        Self::SmallComponents,
+        Self::ShortSegments,
         Self::Deformation,
     ];
 
@@ -68,13 +66,13 @@ impl Term {
             Self::PeakSignificance => "peak significance",
             Self::MarginOverChance => "margin over chance",
             Self::Deviation => "standard deviation of the position",
-            Self::InliersToCrossings => "inliers to walls through free space",
             Self::CommonArea => "common area",
             Self::IndependentInliers => "independent inliers",
             Self::Constraints => "constraints in the weaker direction",
             Self::Residual => "local residual",
             Self::CrossingConflicts => "conflicts that are walls",
-            Self::Crossings => "walls through free space",
+            Self::SmallComponents => "furniture and pillars",
+            Self::ShortSegments => "short pieces of wall",
             Self::Deformation => "deformation",
         }
     }
@@ -84,11 +82,12 @@ impl Term {
         match self {
             Self::PeakSignificance
             | Self::MarginOverChance
-            | Self::InliersToCrossings
             | Self::CommonArea
             | Self::IndependentInliers
-            | Self::Constraints => 1.0,
-            Self::Deviation | Self::Residual | Self::CrossingConflicts | Self::Crossings | Self::Deformation => -1.0,
+            | Self::Constraints
+            | Self::SmallComponents
+            | Self::ShortSegments => 1.0,
+            Self::Deviation | Self::Residual | Self::CrossingConflicts | Self::Deformation => -1.0,
         }
     }
 }
@@ -108,12 +107,12 @@ impl Terms {
     ) -> Self {
         let Agreement {
             overlap,
-            inlier_length,
             conflict_length,
             crossing_length,
             independent_share,
             constraints,
             residual,
+            details,
             ..
         } = *agreement;
         let confirmed = (independent_share / FULL_SHARE).min(1.0);
@@ -121,13 +120,13 @@ impl Terms {
             confirmed * significance.clamp(0.0, MOST_SIGNIFICANCE).ln_1p(),
             margin,
             (LEAST_DEVIATION + deviation).min(1.0).ln(),
-            confirmed * ((1.0 + inlier_length) / (1.0 + crossing_length)).ln(),
             confirmed * overlap.clamp(1.0, MOST_AREA).ln(),
             independent_share,
             (constraints as f64).ln_1p(),
             residual,
             crossing_length / (conflict_length + MORE_CONFLICT),
-            crossing_length / (agreement.compared_length() + MORE_WALL),
+            details.components.log_ratio(),
+            details.segments.log_ratio(),
             deformation_cost.max(0.0).sqrt(),
         ])
     }

@@ -22,6 +22,7 @@ fn proposed(source: &str, transform_a_b: &Pose2) -> Alignment {
         b: "robot2".into(),
         covariance: [1e-4, 0.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 1e-6],
         score: 0.3,
+        margin: 0.5,
         source: source.into(),
         method: source.into(),
         accepted: true,

@@ -118,6 +118,15 @@ impl PointIndex {
         self.starts[start + first] as usize..self.starts[start + last + 1] as usize
     }
 
+    /// Indices in [`points`](Self::points) of the points within `radius` of `point`, in their order.
+    pub fn within(&self, point: &Point2, radius: f64) -> impl Iterator<Item = usize> {
+        let buckets = self.buckets;
+        let (first_row, last_row) = (buckets.row(point.y - radius), buckets.row(point.y + radius));
+        let (first, last) = (buckets.column(point.x - radius), buckets.column(point.x + radius));
+        let is_near = move |index: &usize| (self.points[*index] - point).norm_squared() <= radius * radius;
+        (first_row..=last_row).flat_map(move |row| self.run(row, first, last)).filter(is_near)
+    }
+
     /// The point nearest to `point`, if one is within `radius` of it. Of several at equal distance it is the first.
     pub fn nearest(&self, point: &Point2, radius: f64) -> Option<Neighbour> {
         self.nearest_from(point, radius, usize::MAX)

@@ -101,8 +101,8 @@ impl FloorPlan {
         Self::new(&[[0.0, 0.0, 20.0, 0.0], [20.0, 0.0, 20.0, 12.0], [20.0, 12.0, 0.0, 12.0], [0.0, 12.0, 0.0, 0.0]])
     }
 
-    /// A building of 20 x 12 m whose two halves are the same but for one short wall.
-    pub(crate) fn nearly_symmetric() -> Self {
+    /// A building of 20 m x 12 m that looks the same after half a turn.
+    pub(crate) fn symmetric() -> Self {
         let mut walls = vec![];
         for [x1, y1, x2, y2] in [
             [0.0, 0.0, 20.0, 0.0],
@@ -114,8 +114,12 @@ impl FloorPlan {
         ] {
             walls.extend([[x1, y1, x2, y2], [20.0 - x1, 12.0 - y1, 20.0 - x2, 12.0 - y2]]);
         }
-        walls.push([9.0, 8.0, 9.8, 8.0]);
         Self::new(&walls)
+    }
+
+    /// A building of 20 x 12 m whose two halves are the same but for one short wall.
+    pub(crate) fn nearly_symmetric() -> Self {
+        Self::symmetric().with(&[[9.0, 8.0, 9.8, 8.0]])
     }
 
     /// A straight corridor without an end, 2 m wide.

@@ -1,8 +1,10 @@
 //! Walls of a map as points with normals, for registration and comparison.
 
+mod extents;
 mod wall_line;
 mod wall_map;
 
+pub use extents::WallExtent;
 pub use wall_map::{KnownSample, WallMap};
 
 use crate::shared::robot_maps::RobotMap;

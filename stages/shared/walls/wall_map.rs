@@ -1,5 +1,6 @@
 //! Walls and known space of one map, for registration and verification.
 
+use super::extents::{WallExtent, extents};
 use super::wall_line::{CellRows, LineFit, Window};
 use crate::shared::deformation::Deformation;
 use crate::shared::geometry::{Cell, Grid, Point2, PointIndex, is_free, is_known, is_occupied};
@@ -22,6 +23,8 @@ pub struct WallMap {
     pub walls: PointIndex,
     /// Unit normals of the walls, in the order of the index; zero where the neighbours show no line.
     pub normals: Vec<Vector2<f64>>,
+    /// How large the things are that the points belong to, in the order of the index.
+    pub extents: Vec<WallExtent>,
     /// Length of wall per point, metres.
     pub spacing: f64,
     /// Known space, sampled evenly.
@@ -50,9 +53,10 @@ impl WallMap {
         let fits: Vec<LineFit> = cells.iter().map(|cell| window.fit(&rows, *cell)).collect();
         let points: Vec<Point2> = fits.iter().map(|fit| grid.geometry.origin * (fit.point * resolution)).collect();
         let (walls, order) = PointIndex::new(&points, BUCKET_SIDE);
-        let normals = order.iter().map(|&i| grid.geometry.origin.rotation * fits[i].normal).collect();
+        let normals: Vec<_> = order.iter().map(|&i| grid.geometry.origin.rotation * fits[i].normal).collect();
+        let extents = extents(&walls, &normals, resolution);
         let (samples, sample_area) = known_samples(grid);
-        Self { walls, normals, spacing: resolution, samples, sample_area }
+        Self { walls, normals, extents, spacing: resolution, samples, sample_area }
     }
 
     /// The same walls and samples, displaced by a deformation. Its turns are so small that the normals stay.
@@ -61,9 +65,10 @@ impl WallMap {
         let moved: Vec<Point2> = self.walls.points().iter().map(|point| deformation.apply(point)).collect();
         let (walls, order) = PointIndex::new(&moved, BUCKET_SIDE);
         let normals = order.iter().map(|&i| self.normals[i]).collect();
+        let extents = order.iter().map(|&i| self.extents[i]).collect();
         let samples =
             self.samples.iter().map(|sample| KnownSample { point: deformation.apply(&sample.point), ..*sample });
-        Self { walls, normals, samples: samples.collect(), ..*self }
+        Self { walls, normals, extents, samples: samples.collect(), ..*self }
     }
 }
 

@@ -40,7 +40,7 @@ pub(super) struct Example {
     /// The places.
     pub(super) places: Vec<Place>,
     /// The aliases of the most probable of them, and how near each is to the truth.
-    pub(super) aliases: Vec<([f64; 2], Closeness)>,
+    pub(super) aliases: Vec<([f64; 3], Closeness)>,
 }
 
 /// A place that is judged.

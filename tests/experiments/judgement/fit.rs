@@ -11,6 +11,8 @@ use nalgebra::{DMatrix, DVector};
 const REGULARISATION: f64 = 1.0;
 /// Simulated pairs that belong together weigh half as much in all as recorded ones: they only stand for what is not recorded.
 const SIMULATED: f64 = 0.5;
+/// Pairs of buildings whose parts are alike weigh a tenth in all: such buildings are rare, and all are simulated.
+const PARTS_ALIKE: f64 = 0.1;
 /// Newton's method has converged when no weight changes by more.
 const CONVERGENCE: f64 = 1e-9;
 const MOST_ITERATIONS: usize = 200;
@@ -139,6 +141,30 @@ fn derivatives(
     (loss, gradient, information)
 }
 
+/// Examples that have a total weight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Group {
+    /// Recorded maps that belong together.
+    Recorded,
+    /// Simulated maps that belong together.
+    Simulated,
+    /// Those of a building whose parts are alike.
+    PartsAlike,
+    /// Maps of different buildings.
+    Different,
+}
+
+impl Group {
+    fn of(example: &Example) -> Self {
+        match (example.is_related, example.is_simulated()) {
+            (false, _) => Self::Different,
+            (true, true) if example.has_parts_alike() => Self::PartsAlike,
+            (true, true) => Self::Simulated,
+            (true, false) => Self::Recorded,
+        }
+    }
+}
+
 /// The weights of the judgement.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Weights {
@@ -151,24 +177,20 @@ pub(super) struct Weights {
 impl Weights {
     /// The likeliest ones.
     pub(super) fn fit(examples: &[&Example]) -> Result<Self> {
-        // What is the right place inexactly, and what is an alias, would be taken for wrong; and buildings whose parts are
-        // alike are for the aliases.
-        let is_clear = |example: &Example| !example.is_inexact() && !example.is_aliased() && !example.has_parts_alike();
-        let clear: Vec<&Example> = examples.iter().copied().filter(|example| is_clear(example)).collect();
-        let count = |is_related: bool, is_simulated: bool| {
-            let is_meant = |example: &&&Example| {
-                (example.is_related, example.is_simulated()) == (is_related, is_simulated) && !example.places.is_empty()
-            };
-            clear.iter().filter(is_meant).count() as f64
+        // What is the right place inexactly, and what is an alias, would be taken for wrong.
+        let is_clear = |example: &Example| {
+            !example.places.is_empty() && !example.is_inexact() && (example.has_parts_alike() || !example.is_aliased())
         };
-        let weight = |example: &Example| {
-            let (recorded, simulated) = (count(true, false), count(true, true));
-            let of_simulated = if recorded > 0.0 { SIMULATED * recorded } else { simulated };
-            match (example.is_related, example.is_simulated()) {
-                (true, false) => 1.0,
-                (true, true) => of_simulated / simulated,
-                (false, _) => (recorded + of_simulated) / (count(false, false) + count(false, true)),
-            }
+        let clear: Vec<&Example> = examples.iter().copied().filter(|example| is_clear(example)).collect();
+        let count = |group: Group| clear.iter().filter(|example| Group::of(example) == group).count() as f64;
+        let [recorded, simulated, alike, different] =
+            [Group::Recorded, Group::Simulated, Group::PartsAlike, Group::Different].map(count);
+        let total = if recorded > 0.0 { recorded } else { simulated / SIMULATED };
+        let weight = |example: &Example| match Group::of(example) {
+            Group::Recorded => 1.0,
+            Group::Simulated => SIMULATED * total / simulated,
+            Group::PartsAlike => PARTS_ALIKE * total / alike,
+            Group::Different => (recorded + SIMULATED * total) / different,
         };
         let choice = |example: &Example| Choice {
             weight: weight(example),
@@ -181,7 +203,7 @@ impl Weights {
         let choices: Vec<Choice> = clear.iter().map(|example| choice(example)).collect();
         let places = Linear::fit(&choices, &Term::ALL.map(Term::sign))?;
         let aliases: Vec<Choice> = examples.iter().flat_map(|example| choices_of_aliases(example, &places)).collect();
-        let aliases = Linear::fit(&aliases, &[1.0, -1.0])?;
+        let aliases = Linear::fit(&aliases, &[1.0, -1.0, 1.0])?;
         let right: Vec<[f64; COUNT]> = examples
             .iter()
             .flat_map(|example| &example.places)

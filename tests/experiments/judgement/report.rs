@@ -135,14 +135,16 @@ pub(super) fn weights_source(weights: &Weights, examples: &[Example]) -> String 
          /// The mean of each term over the right places of the fit.\n\
          pub const TYPICAL: [f64; super::COUNT] = [\n{}];\n\
          /// The log-odds of an alias against the place that it is an alias of: in any case, for the logarithm of the self-similar length\n\
-         /// as a share of the inliers there, and for the log-likelihood ratio of the contradictions.\n\
-         pub const ALIAS: [f64; 3] = [{:.4}, {:.4}, {:.4}];\n",
+         /// as a share of the inliers there, for the log-likelihood ratio of the contradictions, and for the details that agree there\n\
+         /// and not here.\n\
+         pub const ALIAS: [f64; 4] = [{:.4}, {:.4}, {:.4}, {:.4}];\n",
         weights.places.intercept,
         array(&weights.places.weights),
         array(&weights.typical),
         weights.aliases.intercept,
         weights.aliases.weights[0],
         weights.aliases.weights[1],
+        weights.aliases.weights[2],
     );
     text
 }
