@@ -11,8 +11,8 @@ use nalgebra::{DMatrix, DVector};
 const REGULARISATION: f64 = 1.0;
 /// Simulated pairs that belong together weigh half as much in all as recorded ones: they only stand for what is not recorded.
 const SIMULATED: f64 = 0.5;
-/// Pairs of buildings whose parts are alike weigh a tenth in all: such buildings are rare, and all are simulated.
-const PARTS_ALIKE: f64 = 0.1;
+/// Pairs of buildings whose parts are alike weigh a twentieth in all: such buildings are rare, and all are simulated.
+const PARTS_ALIKE: f64 = 0.05;
 /// Newton's method has converged when no weight changes by more.
 const CONVERGENCE: f64 = 1e-9;
 const MOST_ITERATIONS: usize = 200;
