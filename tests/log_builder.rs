@@ -132,11 +132,13 @@ impl TestMap {
         map
     }
 
-    /// The room with more walls inside, so that it looks like itself from one side only.
+    /// The room with more walls and furniture inside, so that it looks like itself from one side only.
     pub fn flat() -> Self {
         let mut map = Self::room();
         let width = map.info.width as usize;
-        for (rows, columns) in [(60..62, 130..200), (110..160, 120..122), (30..32, 0..40)] {
+        let walls = [(60..62, 130..200), (110..160, 120..122), (30..32, 0..40)];
+        let furniture = [(20..32, 150..170), (120..140, 30..40), (85..97, 150..162), (136..144, 150..178)];
+        for (rows, columns) in walls.into_iter().chain(furniture) {
             for row in rows {
                 map.cells[row * width..][columns.clone()].fill(100);
             }

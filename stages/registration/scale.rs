@@ -8,7 +8,6 @@ use super::judgement::{UserKnowledge, Verdict};
 use super::search::{MapAlignerParameters, PreparedMap, peak_significance};
 use super::{PreparedPair, RegistrationParameters, register};
 use crate::shared::geometry::{Grid, GridGeometry};
-use crate::shared::walls::DEVIATION;
 use rayon::prelude::*;
 
 /// Bounds of the step between the factors that are tried: with fewer the time of large maps is bounded, whose ends then move
@@ -20,6 +19,8 @@ const BY_CHANCE: f64 = 0.05;
 const FINEST_STEP: f64 = 0.002;
 /// An error of the resolution below this is a deformation.
 const LEAST_ERROR: f64 = 0.01;
+/// Shifts of regions that are the noise of drawing, metres.
+const NOISE: f64 = 0.01;
 /// Number of the best factors that are looked at closely.
 const LOOKED_AT: usize = 2;
 /// Least probability at which a scale is reported, which is not a merge.
@@ -61,6 +62,9 @@ impl Scale {
             best = [smaller, larger].into_iter().flatten().fold(best, sharper);
             step = if best.factor == last { 0.5 * step } else { step };
         }
+        // A deformation makes up for what is left, and shows it.
+        let left = best.verdict.candidate.deformed.map(|deformed| best.factor * deformed.scale);
+        let best = left.and_then(at).unwrap_or(best);
         (best.factor.ln().abs() > LEAST_ERROR).then_some(best)
     }
 
@@ -72,7 +76,7 @@ impl Scale {
     /// Precision of the walls that agree: their length over the variance of where they are drawn.
     fn precision(&self) -> f64 {
         let agreement = &self.verdict.candidate.agreement;
-        agreement.inlier_length / (DEVIATION.powi(2) + agreement.residual.powi(2))
+        agreement.inlier_length / (NOISE.powi(2) + agreement.residual.powi(2))
     }
 
     /// Registers the maps with map b larger by a factor. `None` if it is not more probable than not that they agree, where

@@ -119,9 +119,9 @@ fn without_enough_tags_a_merge_goes_by_the_maps() {
 fn robots_in_a_building_whose_parts_are_alike_are_not_merged_wrongly() {
     let folder = TempDir::new().unwrap();
     // In the second, two robots have seen opposite ends, and only the self-similarity of each map shows the ambiguity.
-    let (ambiguous, alike) = ("decide which is right", "the building is self-similar");
+    let (ambiguous, alike, chance) = ("decide which is right", "the building is self-similar", "may be chance");
     for (layout, seed, reason) in
-        [("symmetric", "903", ambiguous), ("symmetric", "904", alike), ("repeated", "901", ambiguous)]
+        [("symmetric", "903", ambiguous), ("symmetric", "904", alike), ("repeated", "901", chance)]
     {
         let layout = format!("layout=\"{layout}\"");
         let mut args = vec!["--robots", "3", "--seed", seed];
