@@ -78,10 +78,11 @@ pub fn judge_again(
     let rival = most_probable(&mut (0..candidates.len()).filter(|number| *number != best));
     let rival = rival.map(|other| Rival::new(&candidates[best], &candidates[other], probabilities[other]));
     let probability = probabilities[best];
+    let of_others = probabilities.iter().sum::<f64>() - probability;
     let candidate = candidates.into_iter().nth(best)?;
     let mut verdict =
         Verdict { probability, rival, listed, prior: prior(&candidate, is_expected), ..Verdict::of(candidate) };
-    verdict.refusal = refusal(&verdict, parameters);
+    verdict.refusal = refusal(&verdict, of_others, parameters);
     Some(verdict)
 }
 
@@ -174,8 +175,9 @@ fn unexpected(candidate: Candidate, window: &PoseWindow) -> Verdict {
     Verdict { refusal: Some(refusal), ..Verdict::of(candidate) }
 }
 
-/// Why a verdict is refused; none if it is as probable as required.
-fn refusal(verdict: &Verdict, parameters: &JudgementParameters) -> Option<Refusal> {
+/// Why a verdict is refused, where one of all other candidates is right with a probability; none if it is as probable as
+/// required.
+fn refusal(verdict: &Verdict, of_others: f64, parameters: &JudgementParameters) -> Option<Refusal> {
     let JudgementParameters { accept, max_bend: most, .. } = *parameters;
     let Verdict { candidate, probability, rival, .. } = verdict;
     if candidate.hypothesis.is_refused {
@@ -185,9 +187,9 @@ fn refusal(verdict: &Verdict, parameters: &JudgementParameters) -> Option<Refusa
         let rms = candidate.deformed.map(|deformed| deformed.rms);
         return rms.filter(|rms| *rms > most).map(|rms| Refusal::Deformed { rms, most });
     }
-    // The missing probability is that of another candidate, or of none of them.
-    let of_none = 1.0 - probability - rival.as_ref().map_or(0.0, |rival| rival.probability);
-    if let Some(rival) = rival.as_ref().filter(|rival| rival.probability > of_none) {
+    // The missing probability is that of other candidates, or of none of them.
+    let of_none = 1.0 - probability - of_others;
+    if let Some(rival) = rival.as_ref().filter(|_| of_others > of_none) {
         let (shift, turn) = (rival.shift, rival.turn.to_degrees());
         let is_other_source = rival.is_by_tags != candidate.rests_on(Basis::is_by_tags);
         return Some(match is_other_source {
