@@ -8,6 +8,7 @@ use super::MapView;
 use super::regions::{ComparedWall, Finding};
 use crate::shared::walls::WallExtent;
 
+// Both sizes were chosen by cross-validation, with the weights of the judgement.
 /// A connected component of less extent is a thing in a room, metres.
 const SMALL_COMPONENT: f64 = 3.0;
 /// A straight segment of less extent is a detail of a wall, metres.
