@@ -226,10 +226,26 @@ mod tests {
         }
     }
 
+    proptest! {
+        #[test]
+        fn the_points_within_a_radius_are_those_of_a_test_of_all_points(
+            points in prop::collection::vec((-5.0..5.0, -3.0..3.0), 0..200),
+            x in -7.0..7.0, y in -7.0..7.0, radius in 0.0..3.0,
+        ) {
+            let points: Vec<Point2> = points.into_iter().map(|(x, y)| Point2::new(x, y)).collect();
+            let point = Point2::new(x, y);
+            let (index, _) = PointIndex::new(&points, SIDE);
+            let found: Vec<usize> = index.within(&point, radius).collect();
+            let is_near = |number: &usize| (index.points()[*number] - point).norm_squared() <= radius * radius;
+            prop_assert_eq!(found, (0..points.len()).filter(is_near).collect::<Vec<_>>());
+        }
+    }
+
     #[test]
     fn an_empty_index_has_no_neighbours() {
         let (index, order) = PointIndex::new(&[], SIDE);
         assert_eq!(index.nearest(&Point2::origin(), f64::INFINITY), None);
+        assert_eq!(index.within(&Point2::origin(), f64::INFINITY).count(), 0);
         assert!(order.is_empty());
     }
 
