@@ -4,7 +4,7 @@ use super::faces::{Offset, fit_faces};
 use super::line::{Line, Stretch};
 use super::merge::merge_walls;
 use super::parameters::{Fit, LineExtractorParameters};
-use super::point_index::PointIndex;
+use super::plane_points::PlanePoints;
 use super::ransac::find_walls;
 use super::reliability::reliability;
 use super::scale::Scale;
@@ -31,7 +31,7 @@ const OUTLIER_DEVIATIONS: f64 = 2.5;
 pub fn extract_segments(grid: &Grid<'_>, parameters: &LineExtractorParameters, seed: u64) -> Vec<Segment> {
     let scale = Scale::new(parameters, grid.geometry.resolution);
     let index_of =
-        |points: &[Point2]| PointIndex::new(points, grid.geometry.width, grid.geometry.height, scale.bucket_side);
+        |points: &[Point2]| PlanePoints::new(points, grid.geometry.width, grid.geometry.height, scale.bucket_side);
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let middle = |cell: Cell| Point2::new(cell.column as f64 + 0.5, cell.row as f64 + 0.5);
     let cells: Vec<Point2> = surface_cells(grid, scale.reach).into_iter().map(middle).collect();
@@ -70,7 +70,7 @@ fn sub_sample(points: &[Point2], count: usize, random: &mut impl Rng) -> Vec<Poi
 }
 
 /// Fits a wall to all cells near it. Returns the stretch and the number of cells.
-fn final_fit(index: &PointIndex, wall: &Wall, fit: Fit, scale: &Scale) -> Option<(Stretch, usize)> {
+fn final_fit(index: &PlanePoints, wall: &Wall, fit: Fit, scale: &Scale) -> Option<(Stretch, usize)> {
     let stretch = match fit {
         Fit::Faces => fit_to_faces(index, wall.stretch, scale),
         Fit::LeastSquares | Fit::Ends => fit_to_cells(index, wall.stretch, fit, scale)?,
@@ -85,7 +85,7 @@ fn final_fit(index: &PointIndex, wall: &Wall, fit: Fit, scale: &Scale) -> Option
 /// Where walls meet, cells of the other wall are on one side of this one and would turn it. And where a thick wall
 /// leaves the grid, a wedge of it remains, whose centre line is half way between the wall and the border: it would
 /// turn the wall towards the border.
-fn inner(index: &PointIndex, stretch: &Stretch, scale: &Scale) -> Stretch {
+fn inner(index: &PlanePoints, stretch: &Stretch, scale: &Scale) -> Stretch {
     let margin = if stretch.length() > 6.0 * scale.reach { scale.reach } else { 0.0 };
     let inner = Stretch { line: stretch.line, start: stretch.start + margin, end: stretch.end - margin };
     // A wall along a border of the grid has no other part.
@@ -94,7 +94,7 @@ fn inner(index: &PointIndex, stretch: &Stretch, scale: &Scale) -> Stretch {
 }
 
 /// Fits a stretch to the faces of its wall.
-fn fit_to_faces(index: &PointIndex, mut stretch: Stretch, scale: &Scale) -> Stretch {
+fn fit_to_faces(index: &PlanePoints, mut stretch: Stretch, scale: &Scale) -> Stretch {
     let mut cells = Vec::new();
     for _ in 0..FACE_FITS {
         let inner = inner(index, &stretch, scale);
@@ -117,7 +117,7 @@ fn fit_to_faces(index: &PointIndex, mut stretch: Stretch, scale: &Scale) -> Stre
 }
 
 /// Fits a stretch to all cells near it.
-fn fit_to_cells(index: &PointIndex, mut stretch: Stretch, fit: Fit, scale: &Scale) -> Option<Stretch> {
+fn fit_to_cells(index: &PlanePoints, mut stretch: Stretch, fit: Fit, scale: &Scale) -> Option<Stretch> {
     let mut reach = scale.reach;
     let mut near = Vec::new();
     for _ in 0..FINAL_FITS {
@@ -139,7 +139,7 @@ fn fit_to_cells(index: &PointIndex, mut stretch: Stretch, fit: Fit, scale: &Scal
 }
 
 /// Visits the points within `reach` of a stretch, between its ends.
-fn visit_along(index: &PointIndex, stretch: &Stretch, reach: f64, mut visit: impl FnMut(Point2)) {
+fn visit_along(index: &PlanePoints, stretch: &Stretch, reach: f64, mut visit: impl FnMut(Point2)) {
     index.near_stretch(stretch, reach, |id| {
         let point = index.points()[id];
         if (stretch.start..=stretch.end).contains(&stretch.line.along(&point)) {

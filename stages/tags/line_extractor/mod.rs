@@ -16,7 +16,7 @@ mod faces;
 mod line;
 mod merge;
 mod parameters;
-mod point_index;
+mod plane_points;
 mod ransac;
 mod reliability;
 mod scale;

@@ -2,7 +2,7 @@
 
 use super::line::Line;
 use super::parameters::{LineExtractorParameters, Sampling, Scoring};
-use super::point_index::PointIndex;
+use super::plane_points::PlanePoints;
 use super::scale::Scale;
 use super::wall::{Wall, break_down, fit_stretch};
 use rand::{Rng, RngExt};
@@ -12,7 +12,7 @@ const REFITS: usize = 1;
 
 /// Finds the walls among the points of the index, in the order they are found. No point belongs to two.
 pub(super) fn find_walls(
-    index: &PointIndex,
+    index: &PlanePoints,
     parameters: &LineExtractorParameters,
     scale: &Scale,
     random: &mut impl Rng,
@@ -70,7 +70,7 @@ struct Found {
 }
 
 struct Search<'a> {
-    index: &'a PointIndex,
+    index: &'a PlanePoints,
     parameters: &'a LineExtractorParameters,
     scale: &'a Scale,
 }
@@ -220,7 +220,7 @@ mod tests {
 
     fn walls_of(points: &[Point2], parameters: &LineExtractorParameters) -> Vec<Wall> {
         let scale = Scale::new(parameters, 0.05);
-        let index = PointIndex::new(points, 400, 400, scale.bucket_side);
+        let index = PlanePoints::new(points, 400, 400, scale.bucket_side);
         find_walls(&index, parameters, &scale, &mut ChaCha8Rng::seed_from_u64(1))
     }
 

@@ -1,7 +1,7 @@
 //! Points in square buckets, to find those near a line and near each other.
 
 use super::line::{Line, Stretch};
-use crate::shared::geometry::{Buckets, Point2, PointIndex as BucketIndex};
+use crate::shared::geometry::{Buckets, Point2, PointIndex};
 use nalgebra::Vector2;
 use rand::{Rng, RngExt};
 use std::ops::Range;
@@ -15,19 +15,19 @@ const BANDS: usize = 9;
 ///
 /// A point is identified by its index in [`points`](Self::points), which is sorted by bucket.
 #[derive(Clone, Debug)]
-pub(super) struct PointIndex {
+pub(super) struct PlanePoints {
     /// Extent of the plane.
     size: Vector2<f64>,
-    sorted: BucketIndex,
+    sorted: PointIndex,
 }
 
-impl PointIndex {
+impl PlanePoints {
     /// Sorts the points of a plane of `width` x `height` into buckets of the given side, which is 1 or more.
     pub(super) fn new(points: &[Point2], width: usize, height: usize, side: f64) -> Self {
         let side = if side >= 1.0 { side } else { 1.0 };
         let count = |cells: usize| ((cells as f64 / side).ceil() as usize).max(1);
         let buckets = Buckets { corner: Point2::origin(), side, columns: count(width), rows: count(height) };
-        let sorted = BucketIndex::in_buckets(points, buckets, |_, _| ());
+        let sorted = PointIndex::in_buckets(points, buckets, |_, _| ());
         Self { size: Vector2::new(width as f64, height as f64), sorted }
     }
 
@@ -132,7 +132,7 @@ impl PointIndex {
 
 /// The buckets that a strip of the plane intersects, cut into slices across its longer axis.
 struct Strip<'a> {
-    index: &'a BucketIndex,
+    index: &'a PointIndex,
     /// Whether the strip runs along y rather than x.
     is_steep: bool,
     /// Where the line crosses the lower border of the first slice, and its offset per slice.
@@ -149,7 +149,7 @@ struct Strip<'a> {
 }
 
 impl<'a> Strip<'a> {
-    fn new(index: &'a BucketIndex, line: &Line, reach: f64) -> Self {
+    fn new(index: &'a PointIndex, line: &Line, reach: f64) -> Self {
         let Buckets { side, columns, rows, .. } = *index.buckets();
         let (point, direction) = (line.point(), line.direction());
         let is_steep = direction.y.abs() > direction.x.abs();
@@ -225,7 +225,7 @@ mod tests {
             points in points(), side in 1.0..20.0, reach in 0.1..5.0,
             a in (-20.0..70.0, -20.0..50.0), b in (-20.0..70.0, -20.0..50.0),
         ) {
-            let index = PointIndex::new(&points, 50, 30, side);
+            let index = PlanePoints::new(&points, 50, 30, side);
             let (a, b) = (Point2::new(a.0, a.1), Point2::new(b.0, b.1));
             if let Some(line) = Line::through(&a, &b) {
                 let mut found = Vec::new();
@@ -248,7 +248,7 @@ mod tests {
             points in points(), side in 1.0..20.0, reach in 0.1..5.0,
             a in (-20.0..70.0, -20.0..50.0), b in (-20.0..70.0, -20.0..50.0),
         ) {
-            let index = PointIndex::new(&points, 50, 30, side);
+            let index = PlanePoints::new(&points, 50, 30, side);
             let (a, b) = (Point2::new(a.0, a.1), Point2::new(b.0, b.1));
             if let Some(line) = Line::through(&a, &b) {
                 let (start, end) = (0.0, (b - a).norm());
@@ -267,7 +267,7 @@ mod tests {
 
         #[test]
         fn a_drawn_neighbour_keeps_its_distance(points in points(), seed in 0u64..99, side in 2.0..9.0) {
-            let index = PointIndex::new(&points, 50, 30, side);
+            let index = PlanePoints::new(&points, 50, 30, side);
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             for id in 0..index.points().len() {
                 if let Some(other) = index.draw_neighbour(id, 2.0, 8.0, |id| id % 2 == 0, &mut random) {
@@ -281,7 +281,7 @@ mod tests {
     #[test]
     fn the_search_ends_at_a_gap() {
         let points: Vec<Point2> = [0, 1, 2, 3, 4, 40, 41].map(|x| Point2::new(f64::from(x) + 0.5, 0.5)).to_vec();
-        let index = PointIndex::new(&points, 50, 30, 4.0);
+        let index = PlanePoints::new(&points, 50, 30, 4.0);
         let line = Line::through(&points[0], &points[1]).unwrap();
         let mut found = Vec::new();
         index.near_line(&line, &points[0], 1.0, 10.0, |id| {
@@ -293,7 +293,7 @@ mod tests {
 
     #[test]
     fn an_empty_plane_has_no_points() {
-        let index = PointIndex::new(&[], 0, 0, f64::NAN);
+        let index = PlanePoints::new(&[], 0, 0, f64::NAN);
         let line = Line::through(&Point2::new(0.0, 0.0), &Point2::new(1.0, 1.0)).unwrap();
         index.near_line(&line, &Point2::new(9.0, 9.0), 1.0, 1.0, |_| panic!("a point"));
         index.near_stretch(&Stretch { line, start: -5.0, end: 5.0 }, 1.0, |_| panic!("a point"));
