@@ -8,7 +8,8 @@
 //! So an accepted pose has an alias for each pose at which a map agrees with itself, and the alias is a hypothesis
 //! like any other, with log-odds against the accepted pose:
 //!
-//! - Self-similarity must explain all inliers, and little of it is little evidence.
+//! - Self-similarity must explain all inliers. Where the map was seen to be similar to itself, it does; that the rest
+//!   of the building is alike, too, is the less likely the more there is of the rest.
 //! - Where parts of a building are similar but not the same, walls that agree by self-similarity contradict each
 //!   other as often as the map contradicts itself; walls that are the same contradict each other by noise only, which
 //!   is less.
@@ -120,7 +121,7 @@ impl Alias {
             }
             let by_contradiction = by_contradiction(&here, &there, itself);
             let terms = [
-                extent(&here, itself),
+                unexplained(&here, itself),
                 by_contradiction.clamp(-MOST_CONTRADICTION, MOST_CONTRADICTION),
                 by_details(&there) - by_details(&here),
             ];
@@ -136,9 +137,11 @@ fn is_alike(agreement: &Agreement) -> bool {
     is_much && agreement.inlier_ratio() >= ALIKE_SHARE
 }
 
-/// Logarithm of the self-similar length as a share of the inliers: self-similarity must explain all of them.
-fn extent(here: &Agreement, itself: &Agreement) -> f64 {
-    ((itself.inlier_length + 1.0) / (here.inlier_length + 1.0)).ln().min(0.0)
+/// How many times its own length self-similarity leaves unexplained of the inliers, negative: at an alias, the walls
+/// where the map was not seen to be similar to itself agree all the same, as if the building went on as it was seen to
+/// begin.
+fn unexplained(here: &Agreement, itself: &Agreement) -> f64 {
+    (1.0 - (here.inlier_length + 1.0) / (itself.inlier_length + 1.0)).min(0.0)
 }
 
 /// How far the details agree.
@@ -266,6 +269,13 @@ mod tests {
         let (a, b) = ends(&plan);
         let right = a.transform_to(&b);
         assert_eq!(judged(&a, &b, &right, None), [None, None]);
+    }
+
+    #[test]
+    fn little_self_similarity_does_not_explain_much_that_agrees() {
+        let itself = walls(29.0, 2.0);
+        assert_eq!(unexplained(&walls(20.0, 0.0), &itself), 0.0);
+        assert_eq!(unexplained(&walls(299.0, 8.0), &itself), -9.0);
     }
 
     fn walls(inlier_length: f64, conflict_length: f64) -> Agreement {

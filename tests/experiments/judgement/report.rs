@@ -134,9 +134,9 @@ pub(super) fn weights_source(weights: &Weights, examples: &[Example]) -> String 
          pub const WEIGHTS: [f64; super::COUNT] = [\n{}];\n\
          /// The mean of each term over the right places of the fit.\n\
          pub const TYPICAL: [f64; super::COUNT] = [\n{}];\n\
-         /// The log-odds of an alias against the place that it is an alias of: in any case, for the logarithm of the self-similar length\n\
-         /// as a share of the inliers there, for the log-likelihood ratio of the contradictions, and for the details that agree there\n\
-         /// and not here.\n\
+         /// The log-odds of an alias against the place that it is an alias of: in any case, for how many times its\n\
+         /// length self-similarity leaves unexplained of the inliers, for the log-likelihood ratio of the contradictions, and for the\n\
+         /// details that agree there and not here.\n\
          pub const ALIAS: [f64; 4] = [{:.4}, {:.4}, {:.4}, {:.4}];\n",
         weights.places.intercept,
         array(&weights.places.weights),
