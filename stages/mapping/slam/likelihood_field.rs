@@ -1,14 +1,15 @@
 //! The likelihood field of a set of points: how near a place is to the nearest of them.
 
 use crate::shared::geometry::Point2;
-use nalgebra::Vector2;
+use std::ops::Range;
 
 /// Side of a cell, metres.
 pub(super) const CELL: f64 = 0.05;
 /// Standard deviation of a hit about the wall, metres.
 const DEVIATION: f64 = 0.06;
-/// Cells to each side that a point reaches.
+/// Cells to each side that a point reaches, and the side of the square of all of them.
 const REACH: i64 = 3;
+const SIDE: usize = 2 * REACH as usize + 1;
 /// Levels of the pyramid: the highest has the maximum of 32 by 32 cells.
 pub(super) const LEVELS: usize = 6;
 
@@ -43,17 +44,24 @@ impl LikelihoodField {
         field
     }
 
-    /// Raises the cells around a point to their likelihood.
+    /// Raises the cells around a point to their likelihood, which is the product of one along x and one along y.
     fn stamp(&self, cells: &mut [u8], point: &Point2) {
         let at = (point - self.corner) / CELL;
-        let (column, row) = (at.x.floor() as i64, at.y.floor() as i64);
-        let scale = -0.5 * (CELL / DEVIATION).powi(2);
-        for y in (row - REACH).max(0)..=(row + REACH).min(self.height as i64 - 1) {
-            for x in (column - REACH).max(0)..=(column + REACH).min(self.width as i64 - 1) {
-                let apart = Vector2::new(x as f64 + 0.5, y as f64 + 0.5) - at;
-                let value = (255.0 * (scale * apart.norm_squared()).exp()).round() as u8;
-                let cell = &mut cells[y as usize * self.width + x as usize];
-                *cell = value.max(*cell);
+        let (columns, rows) = (around(at.x, self.width), around(at.y, self.height));
+        if columns.is_empty() || rows.is_empty() {
+            return;
+        }
+        let mut by_column = [0.0; SIDE];
+        for (value, column) in by_column.iter_mut().zip(columns.clone()) {
+            *value = 255.0 * likelihood(column as f64 + 0.5 - at.x);
+        }
+        for row in rows {
+            let by_row = likelihood(row as f64 + 0.5 - at.y);
+            let start = row * self.width;
+            let of_row = &mut cells[start + columns.start..start + columns.end];
+            for (cell, by_column) in of_row.iter_mut().zip(&by_column) {
+                // Rounded to the nearest whole number.
+                *cell = (*cell).max((by_column * by_row + 0.5) as u8);
             }
         }
     }
@@ -98,9 +106,37 @@ impl LikelihoodField {
     }
 }
 
+/// The cells of `count` that a point at a coordinate reaches, both in cells.
+fn around(at: f64, count: usize) -> Range<usize> {
+    let cell = at.floor() as i64;
+    let bounded = |cell: i64| cell.clamp(0, count as i64) as usize;
+    bounded(cell.saturating_sub(REACH))..bounded(cell.saturating_add(REACH + 1))
+}
+
+/// The likelihood of a point at a distance of so many cells along an axis.
+fn likelihood(cells: f64) -> f64 {
+    (-0.5 * (cells * CELL / DEVIATION).powi(2)).exp()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector2;
+
+    #[test]
+    fn a_cell_has_the_likelihood_of_its_distance_to_the_nearest_point() {
+        // One in the middle, one at the edge, and one outside whose likelihood reaches inside.
+        let points = [Point2::new(0.52, 0.49), Point2::new(0.99, 0.3), Point2::new(-0.06, 0.81)];
+        let field = LikelihoodField::new(points.into_iter(), &Point2::origin(), &Point2::new(1.0, 1.0));
+        for (row, column) in (0..20).flat_map(|row| (0..20).map(move |column| (row, column))) {
+            let middle = Point2::new(f64::from(column) + 0.5, f64::from(row) + 0.5) * CELL;
+            let distance = points.iter().map(|point| (point - middle).norm()).fold(f64::INFINITY, f64::min);
+            let wanted = 255.0 * (-0.5 * (distance / DEVIATION).powi(2)).exp();
+            let found = f64::from(field.levels[0][(row * 20 + column) as usize]);
+            // Farther away than the reach of a point it is 0.
+            assert!((found - wanted).abs() < 0.51 || found == 0.0 && wanted < 10.0, "{column} {row}: {found} {wanted}");
+        }
+    }
 
     #[test]
     fn a_level_bounds_all_moves_of_the_cells_below() {

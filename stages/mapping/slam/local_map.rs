@@ -90,8 +90,10 @@ impl LocalMap {
     /// ICP variant using a point-to-line metric").
     pub fn register(&self, scan: &[ScanPoint], guess: &Pose2, prior: Option<(&Pose2, &Matrix3<f64>)>) -> Match {
         let mut pose = *guess;
+        // What each point was nearest to in the round before is near it in the next.
+        let mut nearest = vec![usize::MAX; scan.len()];
         for radius in RADII {
-            let (mut matrix, mut vector, _) = self.equations(scan, &pose, radius);
+            let (mut matrix, mut vector, _) = self.equations(scan, &pose, radius, &mut nearest);
             if let Some((mean, information)) = prior {
                 let off = Vector3::new(
                     mean.translation.x - pose.translation.x,
@@ -107,23 +109,32 @@ impl LocalMap {
             pose.translation.vector += step.xy();
             pose.rotation *= nalgebra::UnitComplex::new(step.z);
         }
-        let (information, _, matched) = self.equations(scan, &pose, RADII[RADII.len() - 1]);
+        let (information, _, matched) = self.equations(scan, &pose, RADII[RADII.len() - 1], &mut nearest);
         Match { pose, information, matched }
     }
 
-    /// Normal equations of a small move (x, y, yaw about the points' frame), and the share of matched points.
-    fn equations(&self, scan: &[ScanPoint], pose: &Pose2, radius: f64) -> (Matrix3<f64>, Vector3<f64>, f64) {
+    /// Normal equations of a small move (x, y, yaw about the points' frame), and the share of matched points. `nearest`
+    /// has for each point the index of the spot or surface that may be near it, and is given that of the nearest.
+    fn equations(
+        &self,
+        scan: &[ScanPoint],
+        pose: &Pose2,
+        radius: f64,
+        nearest: &mut [usize],
+    ) -> (Matrix3<f64>, Vector3<f64>, f64) {
         let (mut matrix, mut vector) = (Matrix3::zeros(), Vector3::zeros());
         let mut matched = 0;
         // Neighbouring points of a wall are one measurement.
         let information = SPACING / CORRELATION_LENGTH / (DEVIATION * DEVIATION);
         let width = WEIGHT_WIDTH * radius;
-        for point in scan {
+        for (point, nearest) in scan.iter().zip(nearest) {
             let arm = pose.rotation * point.place.coords;
             let place = pose.translation.vector + arm;
+            let index = if point.normal.is_some() { &self.index } else { &self.spots };
+            let Some(found) = index.nearest_from(&place.into(), radius, *nearest) else { continue };
+            *nearest = found.index;
             let Some(normal) = point.normal else {
-                let Some(nearest) = self.spots.nearest(&place.into(), radius) else { continue };
-                let off = self.spots.points()[nearest.index].coords - place;
+                let off = self.spots.points()[found.index].coords - place;
                 let weight = information * (-0.5 * off.norm_squared() / (width * width)).exp();
                 matched += 1;
                 for by in [Vector2::x(), Vector2::y()] {
@@ -133,8 +144,7 @@ impl LocalMap {
                 }
                 continue;
             };
-            let Some(nearest) = self.index.nearest(&place.into(), radius) else { continue };
-            let surface = &self.surfaces[nearest.index];
+            let surface = &self.surfaces[found.index];
             if surface.normal.dot(&(pose.rotation * normal)) < LEAST_NORMAL_AGREEMENT {
                 continue;
             }
