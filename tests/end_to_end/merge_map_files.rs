@@ -143,6 +143,33 @@ fn maps_of_other_resolutions_and_turned_origins_are_merged() {
 }
 
 #[test]
+fn maps_in_a_frame_far_from_its_origin_are_merged() {
+    let (folder, _) = map_files("1001");
+    let merged = |far: f64| -> [f64; 3] {
+        for robot in ["robot1", "robot2"] {
+            let path = folder.path().join(format!("{robot}.yaml"));
+            let mut map = map_file::load(&path).unwrap();
+            map.info.origin.position.x += 0.09 * far;
+            map.info.origin.position.y += far;
+            map_file::save(&path, &map).unwrap();
+        }
+        let args = ["robot1.yaml", "robot2.yaml", "-o", "merged.yaml", "--summary", "summary.json"];
+        merge(folder.path(), &args).assert(0, &["merged 2 of 2 robots"]);
+        let summary = fs::read(folder.path().join("summary.json")).unwrap();
+        let summary: Value = serde_json::from_slice(&summary).unwrap();
+        ["x", "y", "yaw"].map(|key| summary["frames"]["robot2"][key].as_f64().unwrap())
+    };
+    let near = merged(0.0);
+    // As far as the origin of UTM: where the origin was before, the map of robot 2 lies as before.
+    let (across, far) = (450_000.0, 5_000_000.0);
+    let [x, y, yaw] = merged(far);
+    let (sin, cos) = yaw.sin_cos();
+    let there = [x + cos * across - sin * far - across, y + sin * across + cos * far - far];
+    let off = (there[0] - near[0]).hypot(there[1] - near[1]);
+    assert!(off < 0.05 && (yaw - near[2]).abs() < 1e-3, "{off} m, {yaw} {}", near[2]);
+}
+
+#[test]
 fn a_wrong_resolution_is_named_and_merged_only_with_the_right_one() {
     let (folder, truth) = map_files("1001");
     let path = folder.path().join("robot2.yaml");
@@ -341,6 +368,13 @@ fn neither_a_map_nor_its_image_is_overwritten_and_no_file_is_written_twice() {
         assert!(files() == before, "{args:?}");
     }
     merge(folder.path(), &["a.yaml", "b.yaml", "-o", "no/such/merged.yaml"]).assert(1, &["no folder no/such"]);
+    // A picture of a map may have the format of its image.
+    fs::copy(folder.path().join("a.pgm"), folder.path().join("c.png")).unwrap();
+    let yaml = fs::read_to_string(folder.path().join("a.yaml")).unwrap();
+    fs::write(folder.path().join("c.yaml"), yaml.replace("a.pgm", "c.png")).unwrap();
+    let image = fs::read(folder.path().join("c.png")).unwrap();
+    gridweave(folder.path(), &["render", "c.yaml", "b.yaml", "-o", "./c.png"]).assert(2, &["c.png is an input"]);
+    assert!(fs::read(folder.path().join("c.png")).unwrap() == image);
 }
 
 #[test]

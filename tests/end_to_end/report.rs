@@ -73,7 +73,9 @@ fn inputs_that_cannot_be_reported_are_errors() {
     };
     refused(&["missing.mcap"], 1, "missing.mcap");
     refused(&["a.yaml"], 2, "`report` reads logs");
-    refused(&["report.html"], 2, "would be overwritten");
+    let log = std::fs::read(folder.path().join("merged.mcap")).unwrap();
+    gridweave(folder.path(), &["report", "merged.mcap", "-o", "./merged.mcap"]).assert(2, &["would be overwritten"]);
+    assert!(std::fs::read(folder.path().join("merged.mcap")).unwrap() == log);
     fs::write(folder.path().join("wrong.json"), "{}").unwrap();
     refused(&["merged.mcap", "--summary", "wrong.json"], 1, "wrong.json is not a summary");
     refused(&["merged.mcap", "--topics", "/icp/alignment"], 1, "there is nothing to report");

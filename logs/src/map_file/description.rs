@@ -92,7 +92,8 @@ impl Description {
             None => Mode::default(),
             Some(name) => Mode::from_name(name).ok_or_else(|| wrong("mode", unknown_mode(name)))?,
         };
-        let reading = Reading { mode, negate, occupied_thresh, free_thresh, unknown: None };
+        let reading =
+            Reading { mode, negate, occupied_thresh, free_thresh, unknown: None, transparent_is_unknown: false };
         Ok(Self { image, resolution, origin, reading })
     }
 }

@@ -7,7 +7,6 @@ use super::{GridMap, MapFileError, MapFileWarning};
 use gridweave_runtime::input_file;
 use gridweave_runtime::ros::{MapMetaData, Pose};
 use nalgebra::{Isometry2, Vector2};
-use std::io;
 use std::path::{Path, PathBuf};
 
 /// The maximum size of an image file, bytes.
@@ -46,8 +45,19 @@ pub fn load_as(yaml: &Path, thresholds: Thresholds) -> Result<(GridMap, Option<M
     };
     let cells =
         shades.cells(|samples, white| reading.pixel(samples, white)).map_err(|error| wrong(error.to_string()))?;
-    let warning = MapFileWarning { image: missing.map(|missing| (missing, path.clone())), ..warning };
+    let warning = MapFileWarning {
+        image: missing.map(|missing| (missing, path.clone())),
+        inverted: more_occupied_than_free(&cells),
+        ..warning
+    };
     Ok((GridMap { info, cells }, warning.if_any()))
+}
+
+/// The numbers of occupied and of free cells, if more are occupied and some are free: robots drive where it is free.
+fn more_occupied_than_free(cells: &[i8]) -> Option<(u64, u64)> {
+    let count = |value: i8| cells.iter().filter(|cell| **cell == value).count() as u64;
+    let (occupied, free) = (count(100), count(0));
+    (free > 0 && occupied > free).then_some((occupied, free))
 }
 
 /// The path of the image in the YAML file at `yaml`. The image need not exist.
@@ -68,10 +78,11 @@ fn describe(yaml: &Path) -> Result<(Description, Option<PathBuf>), MapFileError>
     Ok((Description { image, ..description }, missing))
 }
 
-/// The image beside the YAML file, if the one in the file does not exist: with the same name, as in a file that was copied
+/// The image beside the YAML file, if the one in the file cannot be reached: with the same name, as in a file that was copied
 /// from another machine with its image, or with the name of the YAML file.
 fn image_beside_yaml(named: &Path, yaml: &Path) -> Option<PathBuf> {
-    if !matches!(std::fs::metadata(named), Err(error) if error.kind() == io::ErrorKind::NotFound) {
+    // It may be missing, or in a folder of another user, or below what is no folder here.
+    if std::fs::metadata(named).is_ok() {
         return None;
     }
     let text = named.to_str()?;

@@ -1,7 +1,7 @@
 //! The interpretation of the shades of a map's image as occupancy.
 
 use super::Mode;
-use super::shades::Shades;
+use super::shades::{Histogram, Shades, is_transparent};
 use super::warning::MapFileWarning;
 
 /// The shade in which map savers write unknown cells.
@@ -14,8 +14,9 @@ const LEAST_CONTRAST: f64 = 0.1;
 pub enum Thresholds {
     /// Applied literally, as by a map server.
     Literal,
-    /// Corrected by the image of a trinary file where the two disagree: nav2's map saver writes unknown cells in grey
-    /// 205 with `free_thresh: 0.25`, which makes them free; and walls in grey may be below `occupied_thresh`.
+    /// Corrected by the image where the two disagree: nav2's map saver writes unknown cells in grey 205 with
+    /// `free_thresh: 0.25`, which makes them free; walls in grey may be below `occupied_thresh`; and a map server takes
+    /// the opacity of a trinary image for a colour.
     #[default]
     ByPicture,
 }
@@ -32,35 +33,49 @@ pub(super) struct Reading {
     pub(super) free_thresh: f64,
     /// The first and the last shade that are unknown whatever the thresholds, 0 for black to 1 for white.
     pub(super) unknown: Option<(f64, f64)>,
+    /// Whether transparent pixels of a trinary image are unknown, and the colours alone count in the others; if not,
+    /// opacity counts as a colour.
+    pub(super) transparent_is_unknown: bool,
 }
 
 impl Reading {
     /// The interpretation corrected by the image, and the corrections.
     pub(super) fn by_picture(self, shades: &Shades) -> (Self, MapFileWarning) {
-        if self.mode != Mode::Trinary || self.negate {
+        let has_opacity = shades.has_opacity();
+        // Where opacity scales the occupancy it says what is unknown, and `raw` has no thresholds.
+        if self.mode == Mode::Raw || self.mode == Mode::Scale && has_opacity {
             return (self, MapFileWarning::default());
         }
-        let greys = shades.greys();
+        let Histogram { mut greys, transparent } = shades.histogram();
+        if self.negate {
+            greys.reverse();
+        }
         let spread = if shades.is_lossy() { 4 } else { 0 };
-        let range = UNKNOWN_SHADE - spread..=UNKNOWN_SHADE + spread;
-        let cells: u64 = greys[range.clone()].iter().sum();
+        // 16 bits for each of 8 make 204 of 205.
+        let shade = if greys[UNKNOWN_SHADE] > 0 { UNKNOWN_SHADE } else { UNKNOWN_SHADE - 1 };
+        let range = shade - spread..=shade + spread;
         // The shade is a peak of the histogram, and not part of a gradient.
-        let stands_out =
-            greys[UNKNOWN_SHADE] > greys[UNKNOWN_SHADE - spread - 1].max(greys[UNKNOWN_SHADE + spread + 1]);
-        let unknown = occupancy_of(UNKNOWN_SHADE);
-        let is_free = unknown < self.free_thresh || shades.has_opacity();
-        let is_misread = stands_out && cells > 0 && is_free;
+        let stands_out = greys[shade] > greys[shade - spread - 1].max(greys[shade + spread + 1]);
+        // The map server averages opacity with the colours.
+        let literally = |shade: usize| if has_opacity { 0.75 * occupancy_of(shade) } else { occupancy_of(shade) };
+        let is_free = |shade: &usize| literally(*shade) < self.free_thresh;
+        let misread: u64 = range.clone().filter(is_free).map(|shade| greys[shade]).sum();
+        let is_misread = stands_out && misread > 0;
         let darkest = greys.iter().position(|count| *count > 0).map_or(0.0, occupancy_of);
-        let above = self.free_thresh.max(unknown);
-        let has_grey_walls = darkest <= self.occupied_thresh && darkest > above + LEAST_CONTRAST;
+        let above = self.free_thresh.max(occupancy_of(shade));
+        let has_grey_walls =
+            self.mode == Mode::Trinary && darkest <= self.occupied_thresh && darkest > above + LEAST_CONTRAST;
+        let [first, last] = [*range.start(), *range.end()].map(|shade| if self.negate { 255 - shade } else { shade });
         let reading = Self {
-            unknown: is_misread.then(|| (grey_of(*range.start()), grey_of(*range.end()))),
+            unknown: is_misread.then(|| (grey_of(first.min(last)), grey_of(first.max(last)))),
             occupied_thresh: if has_grey_walls { (above + darkest) / 2.0 } else { self.occupied_thresh },
+            transparent_is_unknown: has_opacity,
             ..self
         };
         let warning = MapFileWarning {
-            unknown: is_misread.then_some((cells, self.free_thresh)),
+            unknown: is_misread.then(|| (misread, if self.negate { 255 - shade } else { shade }, self.free_thresh)),
             walls: has_grey_walls.then_some((darkest, self.occupied_thresh)),
+            transparent: (transparent > 0).then_some(transparent),
             ..Default::default()
         };
         (reading, warning)
@@ -82,7 +97,11 @@ impl Reading {
         if self.unknown.is_some_and(|(first, last)| (first - 1e-3..=last + 1e-3).contains(&grey)) {
             return -1;
         }
+        if self.transparent_is_unknown && opacity.is_some_and(|opacity| is_transparent(opacity, white)) {
+            return -1;
+        }
         let shade = match (self.mode, opacity) {
+            _ if self.transparent_is_unknown => grey,
             // The map server averages opacity with red, green and blue here.
             (Mode::Trinary, Some(opacity)) if count == 1 => mean_of(3.0 * sum + opacity, 4),
             (Mode::Trinary, Some(opacity)) => mean_of(sum + opacity, count + 1),

@@ -30,6 +30,19 @@ pub(super) struct Shades {
     is_lossy: bool,
 }
 
+/// How many pixels have each shade.
+pub(super) struct Histogram {
+    /// The grey shades, 0 for black to 255 for white.
+    pub(super) greys: [u64; 256],
+    /// The number of transparent pixels, which are in none of these.
+    pub(super) transparent: u64,
+}
+
+/// Whether a pixel of an opacity, 0 to `white`, shows less of itself than of what is behind it.
+pub(super) fn is_transparent(opacity: f64, white: f64) -> bool {
+    2.0 * opacity < white
+}
+
 impl Shades {
     /// Decodes an image file: PGM, PPM, PBM, PNG, BMP or JPEG, recognised by its first bytes.
     pub(super) fn decode(bytes: &[u8]) -> ImageResult<Self> {
@@ -89,28 +102,37 @@ impl Shades {
         self.image.color().has_alpha()
     }
 
-    /// The histogram of grey shades, 0 for black to 255 for white.
-    pub(super) fn greys(&self) -> [u64; 256] {
-        let mut greys = [0; 256];
+    /// The histogram of the shades.
+    pub(super) fn histogram(&self) -> Histogram {
+        let mut histogram = Histogram { greys: [0; 256], transparent: 0 };
         match &self.image {
-            DynamicImage::ImageLuma8(grey) => grey.as_raw().iter().for_each(|shade| greys[usize::from(*shade)] += 1),
+            DynamicImage::ImageLuma8(grey) => {
+                grey.as_raw().iter().for_each(|shade| histogram.greys[usize::from(*shade)] += 1);
+            }
             image => {
-                let channels = usize::from(image.color().channel_count()).max(1);
-                let colours = if self.has_opacity() { channels - 1 } else { channels };
-                let mut add = |sum: f64| {
-                    let shade = 255.0 * sum / (colours.max(1) as f64) / self.white;
-                    greys[(shade.round() as usize).min(255)] += 1;
-                };
                 if let Some(flat) = image.as_flat_samples_u8() {
-                    let pixels = flat.samples.chunks_exact(channels);
-                    pixels.for_each(|pixel| add(pixel[..colours].iter().map(|value| f64::from(*value)).sum()));
+                    self.count(flat.samples, &mut histogram);
                 } else if let Some(flat) = image.as_flat_samples_u16() {
-                    let pixels = flat.samples.chunks_exact(channels);
-                    pixels.for_each(|pixel| add(pixel[..colours].iter().map(|value| f64::from(*value)).sum()));
+                    self.count(flat.samples, &mut histogram);
                 }
             }
         }
-        greys
+        histogram
+    }
+
+    fn count<T: Copy + Into<f64>>(&self, samples: &[T], histogram: &mut Histogram) {
+        let channels = usize::from(self.image.color().channel_count()).max(1);
+        let colours = if self.has_opacity() { channels - 1 } else { channels };
+        for pixel in samples.chunks_exact(channels) {
+            let (colours_of_pixel, opacity) = pixel.split_at(colours);
+            if opacity.first().is_some_and(|opacity| is_transparent((*opacity).into(), self.white)) {
+                histogram.transparent += 1;
+                continue;
+            }
+            let sum: f64 = colours_of_pixel.iter().map(|value| (*value).into()).sum();
+            let shade = 255.0 * sum / (colours.max(1) as f64) / self.white;
+            histogram.greys[(shade.round() as usize).min(255)] += 1;
+        }
     }
 
     /// The cells, row by row from the image's last row to its first. `cell` converts a pixel's samples, each from 0 to

@@ -89,6 +89,30 @@ fn png_is_read_with_its_opacity() {
 }
 
 #[test]
+fn opacity_does_not_change_what_a_picture_shows() {
+    let (folder, path) = folder("");
+    let read = |pixels: &[[u8; 4]]| {
+        let image = RgbaImage::from_fn(pixels.len() as u32, 1, |x, _| Rgba(pixels[x as usize]));
+        image.save(folder.path().join("map.png")).unwrap();
+        fs::write(&path, yaml("").replace("map.pgm", "map.png")).unwrap();
+        let (map, warning) = load_as(&path, Thresholds::ByPicture).unwrap();
+        (map.cells, warning.map(|warning| warning.to_string()).unwrap_or_default())
+    };
+    let opaque = |grey: u8| [grey, grey, grey, 255];
+    assert_eq!(read(&[opaque(0), opaque(70), opaque(254), opaque(254)]), (vec![100, 100, 0, 0], String::new()));
+    assert_eq!(read(&[opaque(0), opaque(205), opaque(254)]).0, [100, -1, 0]);
+    // Walls in grey, and in a colour.
+    let (cells, warning) = read(&[opaque(110), opaque(254), opaque(254)]);
+    assert_eq!(cells, [100, 0, 0]);
+    assert!(warning.contains("the darkest cells, with occupancy 0.57, are read as occupied"), "{warning}");
+    assert_eq!(read(&[[200, 60, 0, 255], opaque(254)]).0, [100, 0]);
+    // Transparent black would be occupied.
+    let (cells, warning) = read(&[[0, 0, 0, 0], [0, 0, 0, 0], opaque(0), opaque(254)]);
+    assert_eq!(cells, [-1, -1, 100, 0]);
+    assert!(warning.starts_with("2 transparent cells are read as unknown; --literal-thresholds"), "{warning}");
+}
+
+#[test]
 fn numbers_may_be_quoted() {
     let quoted = "image: map.pgm\nresolution: '0.05'\norigin: ['1', \"-2.5\", 0.5]\noccupied_thresh: '0.65'\n\
                   free_thresh: \"0.25\"\nnegate: '0'";
@@ -111,9 +135,19 @@ fn the_image_overrides_the_thresholds_with_a_note() {
         "{warning}"
     );
     assert!(warning.ends_with("--literal-thresholds reads the file literally"), "{warning}");
-    // Other modes have no shade for unknown, and where white is occupied 205 is occupied.
-    assert_eq!(read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "mode: scale"), (vec![100, 0, 0, 0], String::new()));
-    assert_eq!(read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "negate: 1"), (vec![0, 100, 100, 100], String::new()));
+    // A file in shades of grey without opacity has no other sign of what is unknown.
+    assert_eq!(read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "mode: scale").0, [100, -1, -1, 0]);
+    // Where white is occupied, 205 is nearly so, and 50 is unknown.
+    let (cells, warning) = read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "negate: 1");
+    assert_eq!(cells, [0, 100, 100, 100]);
+    assert!(warning.starts_with("3 cells are occupied and 1 are free: if its image is inverted"), "{warning}");
+    let (cells, warning) = read(b"P5\n4 1\n255\n\xff\x32\x32\x01", "negate: 1");
+    assert_eq!(cells, [100, -1, -1, 0]);
+    assert!(warning.starts_with("2 cells in grey 50 are read as unknown"), "{warning}");
+    // 16 bits of which each is 256 times one of 8: 205 becomes 204.
+    let (cells, warning) = read(b"P5\n4 1\n65535\n\x00\x00\xcd\x00\xcd\x00\xfe\x00", "");
+    assert_eq!(cells, [100, -1, -1, 0]);
+    assert!(warning.starts_with("2 cells in grey 204 are read as unknown"), "{warning}");
     // A shade of a gradient.
     assert_eq!(read(b"P5\n4 1\n255\n\x00\xcc\xcd\xce", "").0, [100, 0, 0, 0]);
     let (cells, warning) = read(b"P5\n4 1\n255\n\x6e\x6e\xcd\xfe", "");
@@ -134,6 +168,13 @@ fn bmp_and_jpeg_are_read() {
         let middle: Vec<i8> = [4, 12, 20].map(|column| map.cells[3 * 24 + column]).into();
         assert_eq!(middle, [100, -1, 0], "{name}: {warning:?}");
     }
+}
+
+#[test]
+fn an_image_below_what_is_no_folder_here_is_read_beside_the_file() {
+    let (folder, path) = folder(&yaml("").replace("map.pgm", "maps/map.pgm"));
+    fs::write(folder.path().join("maps"), "").unwrap();
+    assert!(load_as(&path, Thresholds::Literal).unwrap().1.unwrap().to_string().contains("cannot be reached"));
 }
 
 #[test]
@@ -335,7 +376,7 @@ fn an_image_beside_the_file_is_read_where_the_path_is_one_of_another_machine() {
         let beside = folder.path().join("map.pgm");
         assert_eq!(image_of(&path).unwrap(), beside);
         let warning = warning.unwrap().to_string();
-        assert!(warning.ends_with(&format!("does not exist; {} is read", beside.display())), "{warning}");
+        assert!(warning.ends_with(&format!("cannot be reached; {} is read", beside.display())), "{warning}");
     }
     // One that exists is read whatever lies beside the file, and what is missing everywhere is an error.
     let (folder, path) = folder(&yaml("").replace("map.pgm", "sub/map.pgm"));

@@ -6,12 +6,17 @@ use std::path::PathBuf;
 /// The deviations from a map file's literal content.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MapFileWarning {
-    /// The missing image of the file, and the one that was read instead.
+    /// The image of the file that cannot be reached, and the one that was read instead.
     pub image: Option<(PathBuf, PathBuf)>,
-    /// The number of cells in grey 205 that are unknown, and the `free_thresh` that would make them free.
-    pub unknown: Option<(u64, f64)>,
+    /// The number of cells in the grey of unknown ones that are unknown, that grey (205 from a map saver), and the
+    /// `free_thresh` that would make them free.
+    pub unknown: Option<(u64, usize, f64)>,
     /// The minimum occupancy of occupied cells, and the `occupied_thresh` that no cell reaches.
     pub walls: Option<(f64, f64)>,
+    /// The number of transparent cells, which are unknown.
+    pub transparent: Option<u64>,
+    /// The numbers of occupied and of free cells, where there are more occupied ones: the image may be inverted.
+    pub inverted: Option<(u64, u64)>,
 }
 
 impl MapFileWarning {
@@ -25,11 +30,11 @@ impl fmt::Display for MapFileWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut parts = Vec::new();
         if let Some((missing, read)) = &self.image {
-            parts.push(format!("its image {} does not exist; {} is read", missing.display(), read.display()));
+            parts.push(format!("its image {} cannot be reached; {} is read", missing.display(), read.display()));
         }
-        if let Some((cells, free_thresh)) = self.unknown {
+        if let Some((cells, grey, free_thresh)) = self.unknown {
             parts.push(format!(
-                "{cells} cells in grey 205 are read as unknown; with free_thresh {free_thresh} they would be free"
+                "{cells} cells in grey {grey} are read as unknown; with free_thresh {free_thresh} they would be free"
             ));
         }
         if let Some((from, occupied_thresh)) = self.walls {
@@ -38,8 +43,17 @@ impl fmt::Display for MapFileWarning {
                  {occupied_thresh}"
             ));
         }
-        if self.unknown.is_some() || self.walls.is_some() {
+        if let Some(cells) = self.transparent {
+            parts.push(format!("{cells} transparent cells are read as unknown"));
+        }
+        if self.unknown.is_some() || self.walls.is_some() || self.transparent.is_some() {
             parts.push("--literal-thresholds reads the file literally".to_owned());
+        }
+        if let Some((occupied, free)) = self.inverted {
+            parts.push(format!(
+                "{occupied} cells are occupied and {free} are free: if its image is inverted, so that white is occupied, set \
+                 `negate: 1`, or 0 where it is 1"
+            ));
         }
         f.write_str(&parts.join("; "))
     }

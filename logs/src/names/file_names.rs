@@ -1,7 +1,7 @@
 //! Robot names from the names of files.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Component, Path, PathBuf};
 
 /// The error when files cannot be used as robot names.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -11,7 +11,7 @@ pub enum FileNameError {
     GivenTwice(PathBuf),
     /// Two robots would have the same name.
     #[error(
-        "{one} and {other} would both be named `{name}`; rename one of these files or folders",
+        "{one} and {other} would both be named `{name}`; rename one of these files or folders, or give ROBOT={other}",
         one = one.display(), other = other.display()
     )]
     SameName {
@@ -24,9 +24,9 @@ pub enum FileNameError {
     },
 }
 
-/// A robot name for each file of a map or log, in the order of the files: the file name without its extension, or the
-/// folder name where several files have the same name. A folder's name has no extension. Characters that are not
-/// allowed in a topic are replaced by `_`.
+/// A robot name for each file of a map or log, in the order of the files: the file name without its extension, or where
+/// several files have the same name, the name of the innermost folders that differ. A folder's name has no extension.
+/// Characters that are not allowed in a topic are replaced by `_`.
 ///
 /// # Errors
 ///
@@ -34,10 +34,12 @@ pub enum FileNameError {
 pub fn robot_names(files: &[PathBuf]) -> Result<Vec<String>, FileNameError> {
     check_once(files)?;
     let stems: Vec<String> = files.iter().map(|file| own_name(file)).collect();
-    let count = |stem: &String| stems.iter().filter(|other| *other == stem).count();
-    let name = |(file, stem): (&PathBuf, &String)| match count(stem) {
-        1 => stem.clone(),
-        _ => topic_part(folder_of(file).file_name()),
+    let name = |(file, stem): (&PathBuf, &String)| {
+        let named_alike = files.iter().zip(&stems).filter(|(_, other)| *other == stem).map(|(file, _)| file);
+        match named_alike.clone().count() {
+            1 => stem.clone(),
+            _ => folder_name(file, height_of_difference(named_alike)).unwrap_or_default(),
+        }
     };
     let names: Vec<String> = files.iter().zip(&stems).map(name).collect();
     let mut owners: BTreeMap<&str, &PathBuf> = BTreeMap::new();
@@ -65,6 +67,27 @@ fn own_name(file: &Path) -> String {
         true => topic_part(file.canonicalize().unwrap_or_else(|_| file.to_owned()).file_name()),
         false => topic_part(file.file_stem()),
     }
+}
+
+/// How many folders up the folders of all files have different names, 0 for the innermost, which it is where they have
+/// nowhere.
+fn height_of_difference<'a>(files: impl Iterator<Item = &'a PathBuf> + Clone) -> usize {
+    let names_at = |height: usize| files.clone().map(|file| folder_name(file, height)).collect::<Option<Vec<_>>>();
+    let differ = |names: &[String]| names.iter().collect::<BTreeSet<_>>().len() == names.len();
+    let mut known = (0..).map_while(|height| Some((height, names_at(height)?)));
+    known.find(|(_, names)| differ(names)).map_or(0, |(height, _)| height)
+}
+
+/// The name of the folder of a file, or of one so many folders up, as far as it was typed.
+fn folder_name(file: &Path, height: usize) -> Option<String> {
+    if height == 0 {
+        return Some(topic_part(folder_of(file).file_name()));
+    }
+    let typed = file.parent()?.components().rev().filter_map(|part| match part {
+        Component::Normal(name) => Some(name),
+        _ => None,
+    });
+    typed.skip(height).map(|name| topic_part(Some(name))).next()
 }
 
 /// The absolute folder of a file, since `map.yaml` and `../map.yaml` do not contain its name.
@@ -101,6 +124,9 @@ mod tests {
     #[test]
     fn files_with_equal_names_are_distinguished_by_their_folders() {
         assert_eq!(names(&["r1/map.yaml", "a/r2/map.yaml", "hall.yaml"]).unwrap(), ["r1", "r2", "hall"]);
+        let far = ["robot1/maps/map.yaml", "/data/robot2/maps/map.yaml", "b/robot3/maps/map.yaml"];
+        assert_eq!(names(&far).unwrap(), ["robot1", "robot2", "robot3"]);
+        assert_eq!(names(&["a/r1/map.yaml", "b/r1/map.yaml"]).unwrap(), ["a", "b"]);
     }
 
     #[test]
@@ -122,7 +148,7 @@ mod tests {
 
     #[test]
     fn names_that_stay_equal_are_an_error_with_a_fix() {
-        for files in [["a/r1/map.yaml", "b/r1/map.yaml"], ["a/map.yaml", "a/map.yml"]] {
+        for files in [["r1/map.yaml", "b/r1/map.yaml"], ["a/map.yaml", "a/map.yml"]] {
             let error = names(&files).unwrap_err().to_string();
             assert!(files.iter().all(|file| error.contains(file)) && error.contains("rename"), "{error}");
         }

@@ -1,7 +1,7 @@
 //! `gridweave recover`: writes what can be read of a damaged log.
 
-use crate::job::{check_mcap_ending, is_input};
-use crate::status::{BadUse, Status};
+use crate::job::{check_is_no_input, check_mcap_ending};
+use crate::status::Status;
 use crate::terminal::print;
 use anyhow::Result;
 use clap::Args;
@@ -28,10 +28,7 @@ pub(crate) fn recover(args: &RecoverArgs) -> Result<Status> {
     check_mcap_ending(output)?;
     let bag = if Bag::is_meant(output) { Some(Bag::create(output)?) } else { None };
     let file = bag.as_ref().map_or_else(|| output.clone(), Bag::log);
-    if is_input(input, &file) {
-        let text = format!("{} is an input, and would be overwritten: choose another output", output.display());
-        return Err(BadUse(text).into());
-    }
+    check_is_no_input([input], &file)?;
     let recovery = sink::recover(input, &file)?;
     if let Some(bag) = bag {
         bag.describe()?;

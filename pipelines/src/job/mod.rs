@@ -13,8 +13,7 @@ mod view;
 pub(crate) use inputs::{Inputs, is_yaml};
 pub(crate) use options::RunOptions;
 pub(crate) use outputs::check as check_outputs;
-pub(crate) use outputs::check_mcap_ending;
-pub(crate) use outputs::is_or_holds as is_input;
+pub(crate) use outputs::{check_is_no_input, check_mcap_ending};
 pub(crate) use reading::{NamingOptions, ReadingOptions};
 pub(crate) use view::STANDARD_VIEW;
 

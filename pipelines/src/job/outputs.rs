@@ -21,8 +21,7 @@ pub(crate) fn check(pipeline: &Pipeline, options: &RunOptions) -> Result<()> {
     let outputs = outputs(pipeline, options);
     for (index, output) in outputs.iter().enumerate() {
         if inputs.iter().any(|input| is_or_holds(input, output)) {
-            let text = format!("{} is an input, and would be overwritten: choose another output", output.display());
-            return Err(BadUse(text).into());
+            return Err(is_an_input(output));
         }
         if outputs[..index].iter().any(|other| is_same_name(other, output)) {
             let text = format!("{} would be written twice: choose another name for one of them", output.display());
@@ -37,6 +36,27 @@ pub(crate) fn check(pipeline: &Pipeline, options: &RunOptions) -> Result<()> {
     // The last check, as it removes what killed runs have left.
     outputs.iter().try_for_each(|output| check_writable(output))?;
     Ok(())
+}
+
+/// Checks that a file that a command writes is none of its inputs, under whatever name, nor the image of one that is a map.
+///
+/// # Errors
+///
+/// It is one.
+pub(crate) fn check_is_no_input<'a>(inputs: impl IntoIterator<Item = &'a PathBuf>, output: &Path) -> Result<()> {
+    let files = inputs.into_iter().flat_map(|input| {
+        let path = Input::new(input).path;
+        // A map that cannot be read is an error of the command.
+        map_file::image_of(&path).ok().into_iter().chain([path])
+    });
+    match files.into_iter().find(|input| is_or_holds(input, output)) {
+        Some(_) => Err(is_an_input(output)),
+        None => Ok(()),
+    }
+}
+
+fn is_an_input(output: &Path) -> anyhow::Error {
+    BadUse(format!("{} is an input, and would be overwritten: choose another output", output.display())).into()
 }
 
 /// Checks that the file of a log, which is written as MCAP or as a ROS 1 bag, does not have the ending of another format.
@@ -117,7 +137,7 @@ fn files_of(pipeline: &Pipeline, kind: &str, parameter: &str) -> Vec<PathBuf> {
 }
 
 /// Whether two paths lead to the same file, or the first to a folder that contains the second, also through links.
-pub(crate) fn is_or_holds(input: &Path, output: &Path) -> bool {
+fn is_or_holds(input: &Path, output: &Path) -> bool {
     let (Ok(input), Ok(output)) = (input.canonicalize(), output.canonicalize()) else { return false };
     output.starts_with(&input) || same_file(&input, &output)
 }

@@ -10,8 +10,10 @@ use gridweave_runtime::ros::Alignment;
 use nalgebra::Matrix3;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A length (metres) or variance beyond which a value of an alignment is invalid.
+/// A length beyond which a translation is invalid, metres. Frames with the origin of UTM are that far away.
 const ABSURD: f64 = 1e7;
+/// The same for a value of a covariance: there, a turn of the map moves the origin of its frame by kilometres.
+const ABSURD_VARIANCE: f64 = ABSURD * ABSURD;
 
 /// Solves for the frames of all `robots` in the frame of `reference`, which must be one of them.
 ///
@@ -106,8 +108,9 @@ fn usable(alignment: &Alignment, parameters: &FrameSolverParameters) -> Result<U
             alignment.reason
         ));
     }
-    let values = [alignment.x, alignment.y, alignment.yaw].into_iter().chain(alignment.covariance);
-    if !values.into_iter().all(|value| value.abs() < ABSURD) {
+    let are_valid = [alignment.x, alignment.y, alignment.yaw].iter().all(|value| value.abs() < ABSURD)
+        && alignment.covariance.iter().all(|value| value.abs() < ABSURD_VARIANCE);
+    if !are_valid {
         return Err("a value of its transform or covariance is not finite, or absurdly large".into());
     }
     let covariance = Matrix3::from_row_slice(&alignment.covariance);

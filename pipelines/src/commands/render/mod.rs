@@ -2,7 +2,7 @@
 
 mod overlays;
 
-use crate::job::{Inputs, NamingOptions};
+use crate::job::{Inputs, NamingOptions, check_is_no_input};
 use crate::merge_log::{MergeState, Opened, PlacedRobot, Placing, map_files};
 use crate::status::{BadUse, Status};
 use crate::terminal::{eprint_line, print_line};
@@ -74,9 +74,7 @@ enum Overlay {
 /// Draws a picture.
 pub(crate) fn render(args: &RenderArgs) -> Result<Status> {
     check_format(&args.output).map_err(|error| BadUse(error.to_string()))?;
-    if let Some(input) = args.inputs.iter().find(|input| **input == args.output) {
-        return Err(BadUse(format!("{} is an input, and would be overwritten", input.display())).into());
-    }
+    check_is_no_input(&args.inputs, &args.output)?;
     if args.at.is_some_and(|at| at.is_nan() || at < 0.0) {
         return Err(BadUse("--at must be 0 s or more".to_owned()).into());
     }
