@@ -13,7 +13,7 @@
 //! ```
 
 use crate::commands::merge::MergeArgs;
-use crate::job::{Job, Output, RunOptions, Watcher};
+use crate::job::{Inputs, Job, Output, RunOptions, Watcher};
 use crate::shipped;
 use crate::status::BadUse;
 use crate::summary::RunSummary;
@@ -68,7 +68,7 @@ pub fn merge_files(files: &[PathBuf], request: &MergeRequest, observer: &dyn Obs
     }
     let args = MergeArgs { inputs: files.to_vec(), output: PathBuf::new(), options: request.options() };
     let pipeline = Path::new(args.pipeline()?);
-    request.run(pipeline, files, request.log_or(Output::MapOnly), [], observer)
+    request.run(pipeline, (files, Inputs::of(files)?), request.log_or(Output::MapOnly), [], observer)
 }
 
 /// Runs a pipeline file, or the shipped pipeline of that name, on files, with the stage kinds of Gridweave and the given ones.
@@ -82,7 +82,7 @@ pub fn run_pipeline(
     kinds: impl IntoIterator<Item = StageKind>,
     observer: &dyn Observer,
 ) -> Result<Merged> {
-    request.run(pipeline, files, request.log_or(Output::OfPipeline), kinds, observer)
+    request.run(pipeline, (files, Inputs::of_run(files)?), request.log_or(Output::OfPipeline), kinds, observer)
 }
 
 /// Merges maps that are in memory, each with the name of its robot.
@@ -105,7 +105,8 @@ pub fn merge_maps(
         return Err(BadUse("there is nothing to merge: give at least one map".to_owned()).into());
     }
     let pipeline = Path::new("map_file_merge");
-    request.run(pipeline, &[], request.log_or(Output::MapOnly), [kind_of_maps(maps)], observer)
+    let none = (&[][..], Inputs::MapFiles);
+    request.run(pipeline, none, request.log_or(Output::MapOnly), [kind_of_maps(maps)], observer)
 }
 
 impl MergeRequest {
@@ -128,14 +129,14 @@ impl MergeRequest {
     fn run(
         &self,
         pipeline: &Path,
-        inputs: &[PathBuf],
+        (inputs, kind): (&[PathBuf], Inputs),
         output: Output<'_>,
         kinds: impl IntoIterator<Item = StageKind>,
         observer: &dyn Observer,
     ) -> Result<Merged> {
         let merged = Arc::new(Mutex::new(None));
-        let kind = merged_map_kind(&merged);
-        let job = Job { pipeline, inputs, output, options: &self.options(), registry: &shipped::registry(kinds) };
+        let map_sink = merged_map_kind(&merged);
+        let job = Job { pipeline, inputs, kind, output, options: &self.options(), registry: &shipped::registry(kinds) };
         let attach = |pipeline: &mut Pipeline| {
             if pipeline.mode == Mode::Live {
                 // Its stages are processes, which cannot share what the program has.
@@ -144,7 +145,7 @@ impl MergeRequest {
                 return Err(BadUse(text).into());
             }
             // A pipeline without maps has no merged map either.
-            pipeline.attach(&kind, toml::Table::new(), "results", |_, _, output| output.topic == Some(MERGED));
+            pipeline.attach(&map_sink, toml::Table::new(), "results", |_, _, output| output.topic == Some(MERGED));
             Ok(())
         };
         let summary = job.run_with(attach, Watcher::Observer(observer))?;

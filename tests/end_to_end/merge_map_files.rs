@@ -294,6 +294,28 @@ fn one_map_has_nothing_to_be_merged_with() {
 }
 
 #[test]
+fn map_files_with_robots_are_read_as_those_without() {
+    let folder = two_rooms();
+    // What a map saver writes: unknown cells in grey 205 that the threshold makes free.
+    let path = folder.path().join("b.yaml");
+    let mut map = map_file::load(&path).unwrap();
+    map.cells[..300].fill(-1);
+    map_file::save(&path, &map).unwrap();
+    let yaml = fs::read_to_string(&path).unwrap();
+    let free_thresh = yaml.lines().find(|line| line.starts_with("free_thresh")).unwrap().to_owned();
+    fs::write(&path, yaml.replace(&free_thresh, "free_thresh: 0.25")).unwrap();
+    let args = ["robot1=a.yaml", "robot2=b.yaml", "-o", "merged.yaml", "--resolution", "robot2=0.05"];
+    merge(folder.path(), &args).assert(0, &["robot1 robot2", "300 cells in grey 205 are read as unknown"]);
+    gridweave(folder.path(), &["info", "robot2=b.yaml"]).assert(0, &["robot2", "300 cells in grey 205"]);
+    // One initial pose is that in the frame of the reference, which is the first robot.
+    let initial = ["a.yaml", "b.yaml", "-o", "merged.yaml", "--initial", "b=0,0,0", "--accept", "b=initial"];
+    merge(folder.path(), &initial).assert(0, &["merged 2 of 2", "in the frame of a"]);
+    // Pipelines of logs read them as logs.
+    let run = ["run", "map_merge", "--input", "r1=a.yaml", "--output", "out.mcap"];
+    gridweave(folder.path(), &run).assert(0, &["only r1 has a map"]);
+}
+
+#[test]
 fn more_pairs_than_a_reader_has_room_for_are_merged_to_the_end() {
     let folder = TempDir::new().unwrap();
     let files: Vec<String> = (1..=9).map(|number| format!("robot{number}.yaml")).collect();

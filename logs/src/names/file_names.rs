@@ -1,5 +1,6 @@
 //! Robot names from the names of files.
 
+use super::Input;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Component, Path, PathBuf};
 
@@ -42,13 +43,34 @@ pub fn robot_names(files: &[PathBuf]) -> Result<Vec<String>, FileNameError> {
         }
     };
     let names: Vec<String> = files.iter().zip(&stems).map(name).collect();
+    check_distinct(names.iter().zip(files))?;
+    Ok(names)
+}
+
+/// Map files with their robots: `ROBOT=FILE` names one, and a robot without a name gets it as by [`robot_names`].
+///
+/// # Errors
+///
+/// A file without a robot is given twice, or two robots would have the same name.
+pub fn map_files(typed: &[PathBuf]) -> Result<Vec<(String, PathBuf)>, FileNameError> {
+    let inputs: Vec<Input> = typed.iter().map(|typed| Input::new(typed)).collect();
+    let unnamed: Vec<PathBuf> =
+        inputs.iter().filter(|input| input.robot.is_none()).map(|input| input.path.clone()).collect();
+    let mut names = robot_names(&unnamed)?.into_iter();
+    let named = inputs.into_iter().filter_map(|Input { robot, path }| Some((robot.or_else(|| names.next())?, path)));
+    let named: Vec<(String, PathBuf)> = named.collect();
+    check_distinct(named.iter().map(|(name, file)| (name, file)))?;
+    Ok(named)
+}
+
+fn check_distinct<'a>(files: impl Iterator<Item = (&'a String, &'a PathBuf)>) -> Result<(), FileNameError> {
     let mut owners: BTreeMap<&str, &PathBuf> = BTreeMap::new();
-    for (name, file) in names.iter().zip(files) {
+    for (name, file) in files {
         if let Some(one) = owners.insert(name, file) {
             return Err(FileNameError::SameName { name: name.clone(), one: one.clone(), other: file.clone() });
         }
     }
-    Ok(names)
+    Ok(())
 }
 
 fn check_once(files: &[PathBuf]) -> Result<(), FileNameError> {
@@ -154,6 +176,16 @@ mod tests {
         }
         // A folder with the name of another file.
         assert!(matches!(names(&["r1.yaml", "r1/map.yaml", "r2/map.yaml"]), Err(FileNameError::SameName { .. })));
+    }
+
+    #[test]
+    fn a_map_file_may_be_given_with_its_robot() {
+        let files = |typed: &[&str]| map_files(&typed.iter().map(PathBuf::from).collect::<Vec<_>>());
+        let named = |name: &str, file: &str| (name.to_owned(), PathBuf::from(file));
+        let found = files(&["a/map.yaml", "r2=b/map.yaml", "c/map.yaml"]).unwrap();
+        assert_eq!(found, [named("a", "a/map.yaml"), named("r2", "b/map.yaml"), named("c", "c/map.yaml")]);
+        assert!(matches!(files(&["r1=a.yaml", "r1=b.yaml"]), Err(FileNameError::SameName { .. })));
+        assert!(matches!(files(&["r1.yaml", "r1=b.yaml"]), Err(FileNameError::SameName { .. })));
     }
 
     #[test]

@@ -93,9 +93,8 @@ fn logs_with_robot_names_or_without_common_topics_are_not_named() {
 fn logs_with_equal_topics_and_equal_file_names_are_an_error_with_a_fix() {
     let folder = Folder::new();
     std::fs::create_dir_all(folder.path().join("x/r")).unwrap();
-    std::fs::create_dir_all(folder.path().join("y/r")).unwrap();
     let one = [("/map", OccupancyGrid::NAME)];
-    let paths = [log(&folder, "x/r/map.mcap", &one), log(&folder, "y/r/map.mcap", &one)];
+    let paths = [log(&folder, "x/r/map.mcap", &one), log(&folder, "x/r/map.log", &one)];
     let error = open(&inputs(&paths), &NameRules::default(), &RobotTopics::default()).err().unwrap().to_string();
     assert!(error.contains("ROBOT=LOG") && error.contains("x/r/map.mcap"), "{error}");
 }

@@ -28,13 +28,15 @@ pub(crate) struct ConvertArgs {
 
 /// Writes logs as one.
 pub(crate) fn convert(args: &ConvertArgs, registry: &Registry) -> Result<Status> {
-    if Inputs::of_maps_or_logs(&args.inputs, "convert")? == Inputs::MapFiles || is_yaml(&args.output) {
+    Inputs::of_maps_or_logs(&args.inputs, "convert")?;
+    let kind = Inputs::of_run(&args.inputs)?;
+    if kind == Inputs::MapFiles || is_yaml(&args.output) {
         let text = "`convert` reads logs and writes an MCAP file or a ROS 1 bag; to merge map files: `gridweave merge A.yaml B.yaml -o OUT`";
         return Err(BadUse(text.to_owned()).into());
     }
     let options = RunOptions { reading: args.reading.clone(), ..Default::default() };
     let (pipeline, output) = (Path::new(PIPELINE), Output::Log(&args.output));
-    let summary = Job { pipeline, inputs: &args.inputs, output, options: &options, registry }.run()?;
+    let summary = Job { pipeline, inputs: &args.inputs, kind, output, options: &options, registry }.run()?;
     for line in summary.warning_lines() {
         eprint_line(line);
     }

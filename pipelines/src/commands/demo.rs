@@ -2,7 +2,7 @@
 
 use crate::commands::simulate;
 use crate::evaluate::evaluate;
-use crate::job::{Job, Output, RunOptions};
+use crate::job::{Inputs, Job, Output, RunOptions};
 use crate::status::Status;
 use crate::terminal::{print, print_line, width};
 use anyhow::{Context, Result};
@@ -49,6 +49,7 @@ pub(crate) fn demo(args: &DemoArgs, registry: &Registry) -> Result<Status> {
     let job = Job {
         pipeline: Path::new("tag_merge"),
         inputs: &inputs,
+        kind: Inputs::Logs,
         output: Output::Log(&merged),
         options: &options,
         registry,

@@ -29,12 +29,14 @@ pub(crate) struct MergeArgs {
 
 /// Merges the maps of logs or of map files.
 pub(crate) fn merge(args: &MergeArgs, registry: &Registry) -> Result<Status> {
+    let kind = Inputs::of(&args.inputs)?;
     let pipeline = args.pipeline()?;
     let (output, options) = match is_yaml(&args.output) {
         true => (Output::MapOnly, with_map(args)?),
         false => (Output::Log(&args.output), args.options.clone()),
     };
-    Job { pipeline: Path::new(pipeline), inputs: &args.inputs, output, options: &options, registry }.run_and_print()
+    Job { pipeline: Path::new(pipeline), inputs: &args.inputs, kind, output, options: &options, registry }
+        .run_and_print()
 }
 
 impl MergeArgs {

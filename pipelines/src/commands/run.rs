@@ -1,6 +1,6 @@
 //! `gridweave run`: runs a pipeline file or a shipped pipeline.
 
-use crate::job::{Job, RunOptions, STANDARD_VIEW, is_yaml};
+use crate::job::{Inputs, Job, RunOptions, STANDARD_VIEW, is_yaml};
 use crate::status::{BadUse, Status};
 use anyhow::Result;
 use clap::Args;
@@ -37,6 +37,7 @@ pub(crate) fn run(args: &RunArgs, registry: &Registry) -> Result<Status> {
     let job = Job {
         pipeline: &args.pipeline,
         inputs: &args.input,
+        kind: Inputs::of_run(&args.input)?,
         output: args.output.as_deref().into(),
         options: &RunOptions { view: args.view.clone(), ..args.options.clone() },
         registry,

@@ -34,15 +34,25 @@ impl Inputs {
                 ))),
             };
         }
-        // A rosbag2 folder may have any name; and a map file of the form ROBOT=FILE is read as a log of the robot.
+        // A rosbag2 folder may have any name.
         let is_map_file = |typed: &PathBuf| {
-            let Input { robot, path } = Input::new(typed);
-            robot.is_none() && is_yaml(&path) && !path.is_dir()
+            let path = Input::new(typed).path;
+            is_yaml(&path) && !path.is_dir()
         };
         match paths.iter().all(is_map_file) && !paths.is_empty() {
             true => Ok(Self::MapFiles),
             false => Ok(Self::Logs),
         }
+    }
+
+    /// The same for a pipeline that the user has chosen: a map file of the form `ROBOT=FILE` is a log of that robot, which any
+    /// pipeline of logs reads.
+    pub(crate) fn of_run(paths: &[PathBuf]) -> Result<Self, BadUse> {
+        let is_named = |typed: &PathBuf| Input::new(typed).robot.is_some();
+        Ok(match Self::of(paths)? {
+            Self::MapFiles if paths.iter().any(is_named) => Self::Logs,
+            inputs => inputs,
+        })
     }
 
     /// The kind of stage that reads the inputs.
@@ -103,9 +113,12 @@ mod tests {
     }
 
     #[test]
-    fn a_map_file_beside_a_log_or_with_a_robot_is_read_as_a_log() {
+    fn a_map_file_beside_a_log_is_read_as_a_log() {
         assert_eq!(of(&["a.yaml", "b.mcap"]), Ok(Inputs::Logs));
-        assert_eq!(of(&["robot1=a.yaml", "robot2=b.yaml"]), Ok(Inputs::Logs));
+        assert_eq!(of(&["robot1=a.yaml", "b.mcap"]), Ok(Inputs::Logs));
+        let named = ["robot1=a.yaml", "robot2=b.yaml"];
+        assert_eq!(of(&named), Ok(Inputs::MapFiles));
+        assert!(matches!(Inputs::of_run(&named.map(PathBuf::from)), Ok(Inputs::Logs)));
         assert!(of(&["a.yaml", "b.pgm"]).unwrap_err().contains("b.pgm is an image"));
     }
 }

@@ -25,7 +25,7 @@ use crate::terminal::{eprint_line, print, print_line, width};
 use anyhow::Result;
 use gridweave_logs::bag::Bag;
 use gridweave_logs::file::replace;
-use gridweave_logs::names::robot_names;
+use gridweave_logs::names::map_files;
 use gridweave_logs::sink::close_log;
 use gridweave_runtime::engine::{self, EngineKind, Observer, RunError, RunReport, processes};
 use gridweave_runtime::pipeline::{Mode, Overrides, Pipeline};
@@ -70,6 +70,8 @@ pub(crate) struct Job<'a> {
     pub(crate) pipeline: &'a Path,
     /// Files for the only source of logs or map files; if empty, those of the pipeline.
     pub(crate) inputs: &'a [PathBuf],
+    /// What these are.
+    pub(crate) kind: Inputs,
     /// The output beside the files of the options.
     pub(crate) output: Output<'a>,
     pub(crate) options: &'a RunOptions,
@@ -167,9 +169,19 @@ impl Job<'_> {
 
     /// The name of a robot, which may be given by its map file among the inputs.
     fn robot(&self, typed: &str) -> String {
-        let file = self.inputs.iter().position(|input| input.as_os_str() == typed);
-        let name = file.and_then(|file| robot_names(self.inputs).ok()?.into_iter().nth(file));
-        name.unwrap_or_else(|| typed.to_owned())
+        let mut files = map_files(self.inputs).unwrap_or_default().into_iter();
+        files.find(|(_, file)| file.as_os_str() == typed).map_or_else(|| typed.to_owned(), |(robot, _)| robot)
+    }
+
+    /// The reference, if the user names one; and with initial poses of map files, whose robots are known beforehand, the one
+    /// that the frame solver would take, so that one initial pose says how its robot lies to that.
+    fn reference(&self) -> Option<String> {
+        let first = || {
+            let is_needed = !self.options.initial.is_empty() && self.kind == Inputs::MapFiles;
+            let robots = map_files(self.inputs).ok().filter(|_| is_needed)?;
+            robots.into_iter().map(|(robot, _)| robot).min()
+        };
+        self.options.reference.as_deref().map(|typed| self.robot(typed)).or_else(first)
     }
 
     /// Replaces a map file in `ROBOT=...` by the name of the robot.
@@ -183,7 +195,7 @@ impl Job<'_> {
     /// The settings of the pipeline; its log is in the bag, if there is one.
     fn overrides(&self, bag: Option<&Bag>) -> Result<Overrides> {
         let mut overrides = Overrides::default();
-        overrides.reference = self.options.reference.as_deref().map(|typed| self.robot(typed));
+        overrides.reference = self.reference();
         overrides.seed = self.options.seed;
         overrides.initial_poses = self.options.initial.iter().map(|typed| self.robot_first(typed)).collect();
         if !self.options.accept.is_empty() {
@@ -191,14 +203,14 @@ impl Job<'_> {
         }
         if !self.inputs.is_empty() {
             let files: Vec<String> = self.inputs.iter().map(|path| text_of(path)).collect::<Result<_>>()?;
-            overrides.set_for_kind(Inputs::of(self.inputs)?.source_kind(), "files", files);
+            overrides.set_for_kind(self.kind.source_kind(), "files", files);
         }
         if let Output::Log(output) = self.output {
             let file = bag.map_or_else(|| output.to_owned(), Bag::log);
             overrides.set_for_kind(LOG_SINK, "file", text_of(&file)?);
         }
         if self.options.literal_thresholds {
-            let inputs = if self.inputs.is_empty() { Inputs::MapFiles } else { Inputs::of(self.inputs)? };
+            let inputs = if self.inputs.is_empty() { Inputs::MapFiles } else { self.kind };
             overrides.set_for_kind(inputs.source_kind(), "literal_thresholds", true);
         }
         if !self.options.resolution.is_empty() {

@@ -105,6 +105,7 @@ pub(super) fn inputs(pipeline: &Pipeline) -> Vec<PathBuf> {
     inputs.extend(files_of(pipeline, "topology_file_source", "files"));
     for map in files_of(pipeline, "map_file_source", "files") {
         // A map that cannot be read is an error of the run.
+        let map = Input::new(&map).path;
         inputs.extend(map_file::image_of(&map));
         inputs.push(map);
     }

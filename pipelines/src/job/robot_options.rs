@@ -17,7 +17,7 @@ pub(super) fn accepted(job: &Job<'_>) -> Result<Table, BadUse> {
 
 /// The resolutions of map files, a parameter of their source.
 pub(super) fn resolutions(job: &Job<'_>) -> Result<Table, BadUse> {
-    if !job.inputs.is_empty() && Inputs::of(job.inputs)? != Inputs::MapFiles {
+    if !job.inputs.is_empty() && job.kind != Inputs::MapFiles {
         return Err(BadUse("--resolution is for map files (YAML), and the inputs are others".to_owned()));
     }
     read(job, "resolution", &job.options.resolution, "ROBOT=METRES for the side of a cell, above 0", |side| {
@@ -28,7 +28,7 @@ pub(super) fn resolutions(job: &Job<'_>) -> Result<Table, BadUse> {
 
 /// The poses of lidars on their robots, a parameter of the source of logs.
 pub(super) fn lidars(job: &Job<'_>) -> Result<Table, BadUse> {
-    if !job.inputs.is_empty() && Inputs::of(job.inputs)? != Inputs::Logs {
+    if !job.inputs.is_empty() && job.kind != Inputs::Logs {
         return Err(BadUse("--lidar is for logs with scans, and the inputs are others".to_owned()));
     }
     read(job, "lidar", &job.options.lidar, "ROBOT=X,Y,YAW in metres and radians", |pose| {

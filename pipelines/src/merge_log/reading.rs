@@ -4,7 +4,6 @@ use super::MergeState;
 use crate::job::NamingOptions;
 use anyhow::Result;
 use gridweave_logs::map_file::{Thresholds, load_as};
-use gridweave_logs::names::robot_names;
 use gridweave_logs::names::{self, Convention, Input, Names};
 use gridweave_logs::reader::{LogMessage, LogReader};
 use gridweave_runtime::message::{Channel, LogTime};
@@ -118,11 +117,11 @@ fn take(
 /// A file cannot be read or is not a map, or two have the same name.
 pub(crate) fn map_files(files: &[PathBuf]) -> Result<MergeState> {
     let mut state = MergeState::default();
-    for (robot, file) in robot_names(files)?.iter().zip(files) {
-        let (map, _) = load_as(file, Thresholds::ByPicture)?;
+    for (robot, file) in names::map_files(files)? {
+        let (map, _) = load_as(&file, Thresholds::ByPicture)?;
         let data: Vec<u8> = map.cells.iter().map(|cell| cell.cast_unsigned()).collect();
         let grid = OccupancyGrid { header: Header::default(), info: map.info, data: &data };
-        state.robot(robot).map = Some(encode(&grid)?);
+        state.robot(&robot).map = Some(encode(&grid)?);
     }
     Ok(state)
 }

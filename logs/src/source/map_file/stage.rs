@@ -2,7 +2,7 @@
 
 use super::{FileMaps, MapFileSourceParameters};
 use crate::map_file::{self, GridMap, Thresholds};
-use crate::names::robot_names;
+use crate::names::map_files;
 use crate::qos;
 use crate::schemas::schema_text;
 use gridweave_runtime::message::{Channel, FixedText, LogTime, MessageHeader};
@@ -44,14 +44,15 @@ impl MapFileSource {
             let help = "give --input FILE.yaml for each robot, or files = [...]";
             return Err(StageError::new(doing, "no input file").with_help(help));
         }
-        let names = robot_names(&parameters.files).map_err(|error| StageError::new(doing, error))?;
+        let files = map_files(&parameters.files).map_err(|error| StageError::new(doing, error))?;
         let thresholds = if parameters.literal_thresholds { Thresholds::Literal } else { Thresholds::ByPicture };
-        if let Some(robot) = parameters.resolutions.keys().find(|robot| !names.contains(robot)) {
+        let names: Vec<&str> = files.iter().map(|(robot, _)| robot.as_str()).collect();
+        if let Some(robot) = parameters.resolutions.keys().find(|robot| !names.contains(&robot.as_str())) {
             let help = format!("the robots are {}", names.join(", "));
             let error = format!("`resolutions` names `{robot}`, which has no map");
             return Err(StageError::new(doing, error).with_help(help));
         }
-        let files = names.into_iter().zip(parameters.files).map(|(robot, file)| {
+        let files = files.into_iter().map(|(robot, file)| {
             let resolution = parameters.resolutions.get(&robot).copied();
             (robot, Origin::File(file, thresholds, resolution))
         });
