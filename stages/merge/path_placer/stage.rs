@@ -8,7 +8,7 @@ use gridweave_runtime::stage::{
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Parameters of the path placer.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
@@ -75,6 +75,8 @@ struct PathPlacer {
     /// Of robots whose poses were matched: the drive as matched, and the time of its last pose.
     matched: BTreeMap<String, (Drive, Time)>,
     placement: Placement,
+    /// Robots whose last path has poses.
+    on_the_map: BTreeSet<String>,
     /// Whether a deformation has arrived that is in no path that was sent.
     has_new_deformations: bool,
     /// The same for a pose.
@@ -142,12 +144,18 @@ impl PathPlacer {
 
     fn send(&mut self, output: &Output<Paths>) -> Result<(), StageError> {
         (self.has_new_deformations, self.has_new_poses) = (false, false);
+        let header = || Header::new(output.log_time(), RobotFrames::WORLD);
+        let mut left = std::mem::take(&mut self.on_the_map);
+        let mut on_the_map = BTreeSet::new();
         for (robot, placed) in self.placement.placed() {
             let Some(drive) = self.drive(robot) else { continue };
-            let header = Header::new(output.log_time(), RobotFrames::WORLD);
-            output.path.send(robot, &Path { header, poses: in_world(drive, &placed).collect() })?;
+            output.path.send(robot, &Path { header: header(), poses: in_world(drive, &placed).collect() })?;
+            left.remove(robot);
+            on_the_map.insert(robot.to_owned());
         }
-        Ok(())
+        self.on_the_map = on_the_map;
+        // A viewer would keep the path of a robot that is placed no more.
+        left.iter().try_for_each(|robot| output.path.send(robot, &Path { header: header(), poses: Vec::new() }))
     }
 
     fn send_poses(&self, output: &Output<Paths>) -> Result<(), StageError> {
@@ -178,6 +186,30 @@ mod tests {
     fn frames(x: f64) -> RobotFrames {
         let frame = RobotFrame { robot: "robot1".into(), x, ..Default::default() };
         RobotFrames { reference: "robot1".into(), frames: vec![frame], ..Default::default() }
+    }
+
+    #[test]
+    fn a_robot_that_is_placed_no_more_has_an_empty_path() {
+        let mut stage = StageHarness::new(&kind(), "").unwrap();
+        let stamped = PoseWithCovarianceStamped::from(PoseStamped::default());
+        for robot in ["robot1", "robot2"] {
+            stage.give::<PoseWithCovarianceStamped>("pose", robot, LogTime(1), &stamped).unwrap();
+        }
+        let placed = |robots: &[&str]| RobotFrames {
+            reference: robots[0].into(),
+            frames: robots.iter().map(|robot| RobotFrame { robot: (*robot).into(), ..Default::default() }).collect(),
+            ..Default::default()
+        };
+        let mut paths = |robots: &[&str]| {
+            stage.give::<RobotFrames>("frames", "", LogTime(2), &placed(robots)).unwrap();
+            let sent = stage.take_messages("path").into_iter();
+            let count = |message: &gridweave_runtime::message::Message| message.decode::<Path>().unwrap().poses.len();
+            sent.map(|message| (message.header().topic.as_str().to_owned(), count(&message))).collect::<Vec<_>>()
+        };
+        let path = |robot: &str, count: usize| (format!("/{robot}/merged_path"), count);
+        assert_eq!(paths(&["robot2"]), [path("robot2", 1)], "the reference until two robots are merged");
+        assert_eq!(paths(&["robot1"]), [path("robot1", 1), path("robot2", 0)]);
+        assert_eq!(paths(&["robot1", "robot2"]), [path("robot1", 1), path("robot2", 1)]);
     }
 
     #[test]

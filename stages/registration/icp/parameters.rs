@@ -48,7 +48,7 @@ pub struct IcpParameters {
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub shrink: f64,
     /// Most iterations at that last distance. The covariance is widened by the motion of the last one.
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = 10_000))]
     pub max_iterations: usize,
     /// Registration has converged when an iteration moves the wall points by less than this, metres.
     #[schemars(extend("exclusiveMinimum" = 0))]
