@@ -9,10 +9,15 @@ use std::fmt::Write;
 /// Maximum number of lines of the reason for a pair; `--explain` prints all.
 const REASON_LINES: usize = 3;
 
+/// A name without line ends, with which it could pass for a line of the text.
+fn in_one_line(name: &str) -> String {
+    name.replace('\n', "\\u000a").replace('\r', "\\u000d")
+}
+
 /// Writes the poses of the maps, the robots that are not merged with reasons, and the decision on each pair, in lines of at
 /// most `width` columns.
 pub(crate) fn write_merge(out: &mut String, merge: &Summary, width: Option<usize>) -> std::fmt::Result {
-    if let Some(reference) = &merge.reference {
+    if let Some(reference) = merge.reference.as_deref().map(in_one_line) {
         let merged = merge.frames.len();
         match (merged, merged + merge.unmerged.len()) {
             (_, 1) => writeln!(out, "only {reference} has a map: there is nothing to merge it with")?,
@@ -30,16 +35,16 @@ pub(crate) fn write_merge(out: &mut String, merge: &Summary, width: Option<usize
     for (robot, reason) in &merge.unmerged {
         match short(reason) {
             line if !line.contains('\n') => {
-                writeln!(out, "{}", wrap(&format!("not merged: {robot}: {line}"), 2, width))?
+                writeln!(out, "{}", wrap(&format!("not merged: {}: {line}", in_one_line(robot)), 2, width))?
             }
             lines => {
-                writeln!(out, "not merged: {robot}:")?;
+                writeln!(out, "not merged: {}:", in_one_line(robot))?;
                 lines.lines().try_for_each(|line| writeln!(out, "{}", wrap(&format!("  {line}"), 4, width)))?;
             }
         }
     }
     for group in &merge.groups {
-        let (count, reference) = (group.frames.len(), &group.reference);
+        let (count, reference) = (group.frames.len(), in_one_line(&group.reference));
         writeln!(out, "{count} of these are merged with each other; map frames in the frame of {reference}:")?;
         out.push_str(&frames_table(&group.frames).fit(width));
     }
@@ -130,6 +135,14 @@ mod tests {
         let mut text = String::new();
         write_merge(&mut text, &serde_json::from_value(merge).unwrap(), None).unwrap();
         text
+    }
+
+    #[test]
+    fn a_name_with_a_line_end_forges_no_line() {
+        let reference = Some("a\nmerged 9 of 9 robots".to_owned());
+        let mut text = String::new();
+        write_merge(&mut text, &Summary { reference, ..Summary::default() }, None).unwrap();
+        assert!(text.contains("a\\u000amerged 9") && text.lines().all(|line| !line.starts_with("merged 9")), "{text}");
     }
 
     #[test]

@@ -76,6 +76,7 @@ fn inputs_that_cannot_be_reported_are_errors() {
     let log = std::fs::read(folder.path().join("merged.mcap")).unwrap();
     gridweave(folder.path(), &["report", "merged.mcap", "-o", "./merged.mcap"]).assert(2, &["would be overwritten"]);
     assert!(std::fs::read(folder.path().join("merged.mcap")).unwrap() == log);
+    refused(&["merged.mcap", "--summary", "/dev/zero"], 1, "no regular file");
     fs::write(folder.path().join("wrong.json"), "{}").unwrap();
     refused(&["merged.mcap", "--summary", "wrong.json"], 1, "wrong.json is not a summary");
     refused(&["merged.mcap", "--topics", "/icp/alignment"], 1, "there is nothing to report");

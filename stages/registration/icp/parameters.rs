@@ -45,7 +45,7 @@ pub struct IcpParameters {
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub min_distance: f64,
     /// Factor by which that distance shrinks with every iteration.
-    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+    #[schemars(range(max = 0.99), extend("exclusiveMinimum" = 0))]
     pub shrink: f64,
     /// Most iterations at that last distance. The covariance is widened by the motion of the last one.
     #[schemars(range(min = 1, max = 10_000))]

@@ -16,6 +16,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use collect::Limits;
 use gridweave_logs::file::replace;
+use gridweave_runtime::input_file;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -78,8 +79,8 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Status> {
 }
 
 fn read_summary(path: &Path) -> Result<Value> {
-    let text = std::fs::read(path).with_context(|| format!("cannot read the summary {}", path.display()))?;
-    let summary: Value = serde_json::from_slice(&text)
+    let text = input_file::read_text(path).with_context(|| format!("cannot read the summary {}", path.display()))?;
+    let summary: Value = serde_json::from_str(&text)
         .with_context(|| format!("{} is not a summary that `merge --summary` has written", path.display()))?;
     if !summary["stages"].is_object() {
         bail!("{} is not a summary that `merge --summary` has written: it has no `stages`", path.display());
