@@ -2,7 +2,9 @@
 
 use super::Drive;
 use crate::shared::placement::{Placed, Placement};
-use gridweave_runtime::ros::{Header, MapDeformation, Path, PoseStamped, PoseWithCovarianceStamped, RobotFrames, Time};
+use gridweave_runtime::ros::{
+    Header, MapDeformation, Path, PoseStamped, PoseWithCovarianceStamped, RobotFrame, RobotFrames, Time,
+};
 use gridweave_runtime::stage::{
     Context, Out, Output, OutputPorts, Outputs, Parameters, Received, StageError, StageKind,
 };
@@ -72,6 +74,8 @@ impl Outputs for Paths {
 struct PathPlacer {
     parameters: PathPlacerParameters,
     drives: BTreeMap<String, Drive>,
+    /// The frames that the last poses of the robots name.
+    pose_frames: BTreeMap<String, String>,
     /// Of robots whose poses were matched: the drive as matched, and the time of its last pose.
     matched: BTreeMap<String, (Drive, Time)>,
     placement: Placement,
@@ -91,6 +95,9 @@ impl PathPlacer {
     ) -> Result<(), StageError> {
         if !self.drives.contains_key(pose.robot()) {
             self.drives.insert(pose.robot().to_owned(), Drive::default());
+        }
+        if self.pose_frames.get(pose.robot()) != Some(&pose.header.frame_id) {
+            self.pose_frames.insert(pose.robot().to_owned(), pose.header.frame_id.clone());
         }
         if let Some(drive) = self.drives.get_mut(pose.robot()) {
             drive.add(pose.header.stamp, pose.pose.pose.planar(), self.parameters.spacing);
@@ -136,10 +143,26 @@ impl PathPlacer {
     }
 
     fn finish(&mut self, output: &Output<Paths>) -> Result<(), StageError> {
+        self.warn_of_other_frames(output);
         if self.has_new_deformations || self.has_new_poses {
             self.send(output)?;
         }
         if output.pose.is_read() { self.send_poses(output) } else { Ok(()) }
+    }
+
+    /// Warns of poses that name another frame than that of the map. A prefix may have been added to one of both only.
+    fn warn_of_other_frames(&self, output: &Output<Paths>) {
+        let last_part = |frame: &str| frame.rsplit('/').next().unwrap_or_default().to_owned();
+        for RobotFrame { robot, frame_id, .. } in &self.placement.frames.frames {
+            let named = self.pose_frames.get(robot).filter(|_| !self.matched.contains_key(robot));
+            let names = |frame: &&String| !frame.is_empty() && !frame_id.is_empty();
+            if let Some(named) = named.filter(names).filter(|named| last_part(named) != last_part(frame_id)) {
+                output.warn(format!(
+                    "the poses of {robot} name the frame `{named}`, and its map is in `{frame_id}`: they are taken for poses in the \
+                     map. If these are two frames, the path is wrong: rename the topic of the poses, so that tf gives them"
+                ));
+            }
+        }
     }
 
     fn send(&mut self, output: &Output<Paths>) -> Result<(), StageError> {
@@ -180,12 +203,35 @@ mod tests {
     use super::*;
     use crate::shared::geometry::pose;
     use gridweave_runtime::message::LogTime;
-    use gridweave_runtime::ros::{RobotFrame, Time};
+    use gridweave_runtime::ros::Time;
     use gridweave_runtime::stage::StageHarness;
 
     fn frames(x: f64) -> RobotFrames {
         let frame = RobotFrame { robot: "robot1".into(), x, ..Default::default() };
         RobotFrames { reference: "robot1".into(), frames: vec![frame], ..Default::default() }
+    }
+
+    #[test]
+    fn poses_that_name_another_frame_than_the_map_are_a_warning() {
+        let warnings = |pose_frame: &str, map_frame: &str| {
+            let mut stage = StageHarness::new(&kind(), "").unwrap();
+            let header = Header { frame_id: pose_frame.to_owned(), ..Default::default() };
+            let stamped = PoseWithCovarianceStamped::from(PoseStamped { header, ..Default::default() });
+            stage.give::<PoseWithCovarianceStamped>("pose", "robot1", LogTime(1), &stamped).unwrap();
+            let mut frames = frames(0.0);
+            frames.frames[0].frame_id = map_frame.to_owned();
+            stage.give::<RobotFrames>("frames", "", LogTime(2), &frames).unwrap();
+            stage.finish(LogTime(3)).unwrap();
+            stage.warnings()
+        };
+        let found = warnings("robot1/odom", "robot1/map");
+        assert!(
+            found.len() == 1 && found.keys().all(|text| text.contains("name the frame `robot1/odom`")),
+            "{found:?}"
+        );
+        for pose_frame in ["robot1/map", "map", "/map", ""] {
+            assert_eq!(warnings(pose_frame, "robot1/map").len(), 0, "{pose_frame}");
+        }
     }
 
     #[test]
