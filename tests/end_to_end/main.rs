@@ -29,6 +29,7 @@ mod log_output;
 mod log_tools;
 mod logging;
 mod looking_on;
+mod map_file_robots;
 mod map_merge;
 mod merge_map_files;
 mod merge_output;

@@ -104,8 +104,8 @@ pub(super) fn inputs(pipeline: &Pipeline) -> Vec<PathBuf> {
     let mut inputs: Vec<PathBuf> = logs.iter().map(|log| Input::new(log).path).collect();
     inputs.extend(files_of(pipeline, "topology_file_source", "files"));
     for map in files_of(pipeline, "map_file_source", "files") {
-        // A map that cannot be read is an error of the run.
         let map = Input::new(&map).path;
+        // A map that cannot be read is an error of the run.
         inputs.extend(map_file::image_of(&map));
         inputs.push(map);
     }
