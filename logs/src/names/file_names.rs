@@ -52,7 +52,7 @@ pub fn robot_names(files: &[PathBuf]) -> Result<Vec<String>, FileNameError> {
 /// # Errors
 ///
 /// A file without a robot is given twice, or two robots would have the same name.
-pub fn map_files(typed: &[PathBuf]) -> Result<Vec<(String, PathBuf)>, FileNameError> {
+pub fn name_map_files(typed: &[PathBuf]) -> Result<Vec<(String, PathBuf)>, FileNameError> {
     let inputs: Vec<Input> = typed.iter().map(|typed| Input::new(typed)).collect();
     let unnamed: Vec<PathBuf> =
         inputs.iter().filter(|input| input.robot.is_none()).map(|input| input.path.clone()).collect();
@@ -180,7 +180,7 @@ mod tests {
 
     #[test]
     fn a_map_file_may_be_given_with_its_robot() {
-        let files = |typed: &[&str]| map_files(&typed.iter().map(PathBuf::from).collect::<Vec<_>>());
+        let files = |typed: &[&str]| name_map_files(&typed.iter().map(PathBuf::from).collect::<Vec<_>>());
         let named = |name: &str, file: &str| (name.to_owned(), PathBuf::from(file));
         let found = files(&["a/map.yaml", "r2=b/map.yaml", "c/map.yaml"]).unwrap();
         assert_eq!(found, [named("a", "a/map.yaml"), named("r2", "b/map.yaml"), named("c", "c/map.yaml")]);

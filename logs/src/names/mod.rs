@@ -25,7 +25,7 @@ mod tests;
 
 pub(crate) use channel::{NamedChannel, Renamed};
 pub use error::NameError;
-pub use file_names::{FileNameError, map_files, robot_names};
+pub use file_names::{FileNameError, name_map_files, robot_names};
 pub use input::Input;
 pub use rename::TopicRename;
 pub use rename_advice::rename_advice;

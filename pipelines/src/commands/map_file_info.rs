@@ -4,7 +4,7 @@ use crate::table::Table;
 use crate::text_wrapping::wrap;
 use anyhow::Result;
 use gridweave_logs::map_file::{Thresholds, load_as};
-use gridweave_logs::names::map_files;
+use gridweave_logs::names::name_map_files;
 use gridweave_runtime::ros::cell::{is_free, is_known, is_occupied};
 use serde::Serialize;
 use std::fmt::Write;
@@ -41,7 +41,7 @@ pub(super) struct MapFileInfo {
 /// # Errors
 /// A file cannot be read or is not a map, or two have the same name.
 pub(super) fn inspect(files: &[PathBuf]) -> Result<Vec<MapFileInfo>> {
-    map_files(files)?.into_iter().map(|(robot, file)| inspect_one(robot, &file)).collect()
+    name_map_files(files)?.into_iter().map(|(robot, file)| inspect_one(robot, &file)).collect()
 }
 
 fn inspect_one(robot: String, file: &Path) -> Result<MapFileInfo> {

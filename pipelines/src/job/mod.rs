@@ -25,7 +25,7 @@ use crate::terminal::{eprint_line, print, print_line, width};
 use anyhow::Result;
 use gridweave_logs::bag::Bag;
 use gridweave_logs::file::replace;
-use gridweave_logs::names::map_files;
+use gridweave_logs::names::name_map_files;
 use gridweave_logs::sink::close_log;
 use gridweave_runtime::engine::{self, EngineKind, Observer, RunError, RunReport, processes};
 use gridweave_runtime::pipeline::{Mode, Overrides, Pipeline};
@@ -169,7 +169,7 @@ impl Job<'_> {
 
     /// The name of a robot, which may be given by its map file among the inputs.
     fn robot(&self, typed: &str) -> String {
-        let mut files = map_files(self.inputs).unwrap_or_default().into_iter();
+        let mut files = name_map_files(self.inputs).unwrap_or_default().into_iter();
         files.find(|(_, file)| file.as_os_str() == typed).map_or_else(|| typed.to_owned(), |(robot, _)| robot)
     }
 
@@ -178,7 +178,7 @@ impl Job<'_> {
     fn reference(&self) -> Option<String> {
         let first = || {
             let is_needed = !self.options.initial.is_empty() && self.kind == Inputs::MapFiles;
-            let robots = map_files(self.inputs).ok().filter(|_| is_needed)?;
+            let robots = name_map_files(self.inputs).ok().filter(|_| is_needed)?;
             robots.into_iter().map(|(robot, _)| robot).min()
         };
         self.options.reference.as_deref().map(|typed| self.robot(typed)).or_else(first)

@@ -117,7 +117,7 @@ fn take(
 /// A file cannot be read or is not a map, or two have the same name.
 pub(crate) fn map_files(files: &[PathBuf]) -> Result<MergeState> {
     let mut state = MergeState::default();
-    for (robot, file) in names::map_files(files)? {
+    for (robot, file) in names::name_map_files(files)? {
         let (map, _) = load_as(&file, Thresholds::ByPicture)?;
         let data: Vec<u8> = map.cells.iter().map(|cell| cell.cast_unsigned()).collect();
         let grid = OccupancyGrid { header: Header::default(), info: map.info, data: &data };

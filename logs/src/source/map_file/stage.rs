@@ -2,7 +2,7 @@
 
 use super::{FileMaps, MapFileSourceParameters};
 use crate::map_file::{self, GridMap, Thresholds};
-use crate::names::map_files;
+use crate::names::name_map_files;
 use crate::qos;
 use crate::schemas::schema_text;
 use gridweave_runtime::message::{Channel, FixedText, LogTime, MessageHeader};
@@ -44,7 +44,7 @@ impl MapFileSource {
             let help = "give --input FILE.yaml for each robot, or files = [...]";
             return Err(StageError::new(doing, "no input file").with_help(help));
         }
-        let files = map_files(&parameters.files).map_err(|error| StageError::new(doing, error))?;
+        let files = name_map_files(&parameters.files).map_err(|error| StageError::new(doing, error))?;
         let thresholds = if parameters.literal_thresholds { Thresholds::Literal } else { Thresholds::ByPicture };
         let names: Vec<&str> = files.iter().map(|(robot, _)| robot.as_str()).collect();
         if let Some(robot) = parameters.resolutions.keys().find(|robot| !names.contains(&robot.as_str())) {
