@@ -235,10 +235,10 @@ fn is_record(file: &mut Window<'_>, position: usize) -> bool {
 }
 
 /// The index records of one channel of a file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct IndexedChannel {
-    /// The first block with messages of the channel.
-    pub(crate) block: usize,
+    /// The blocks with messages of the channel.
+    pub(crate) blocks: Vec<usize>,
     /// The number of messages.
     pub(crate) messages: u64,
     /// The log time of the first, nanoseconds.
@@ -270,7 +270,10 @@ impl ChunkTimes {
         let Some((number, mut entries)) = fields.u16().and_then(|number| Some((number, fields.block()?))) else {
             return;
         };
-        let channel = channels.entry(number).or_insert(IndexedChannel { block, ..Default::default() });
+        let channel = channels.entry(number).or_default();
+        if channel.blocks.last() != Some(&block) {
+            channel.blocks.push(block);
+        }
         while let (Some(time), Some(_)) = (entries.u64(), entries.u64()) {
             channel.add(time);
             let (first, last) = self.0.unwrap_or((time, time));

@@ -1,6 +1,6 @@
 //! The merged messages of several files: by log time, then by file, then by position in the file.
 
-use super::block::LoadedBlock;
+use super::block::{Block, LoadedBlock};
 use super::damage::{Damage, MOST_REPORTS};
 use super::file::LogFile;
 use super::prefetch::{BlockId, Prefetcher};
@@ -9,6 +9,18 @@ use std::cmp::Reverse;
 use std::collections::binary_heap::PeekMut;
 use std::collections::{BTreeSet, BinaryHeap};
 use std::sync::Arc;
+
+/// How much of a file without an index is read where some of its channels are looked for, bytes.
+const READ_WITHOUT_INDEX: u64 = 32 << 20;
+
+/// A part of a channel's messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ChannelPart {
+    /// The first message.
+    Beginning,
+    /// All messages.
+    Whole,
+}
 
 /// A message of a log, borrowed from its block.
 #[derive(Clone, Copy, Debug)]
@@ -112,6 +124,33 @@ impl LogReader {
     /// be called before the first message is read.
     pub(crate) fn sample(&mut self, count: usize) {
         self.prefetcher.sample(count);
+    }
+
+    /// Limits reading to the blocks with messages of the channels that `part` selects, each given by the index of its file and its
+    /// number in it; of a file without an index, to its beginning. Must be called before the first message is read.
+    pub(crate) fn limit_to(&mut self, part: impl Fn(usize, u16) -> Option<ChannelPart>) {
+        let mut blocks = BTreeSet::new();
+        for (file, log) in self.files.iter().enumerate() {
+            let Some(index) = log.index() else {
+                let mut size = 0_u64;
+                let fits = |block: &&Block| {
+                    size = size.saturating_add(block.size());
+                    size <= READ_WITHOUT_INDEX
+                };
+                let count = log.layout.blocks.iter().take_while(fits).count();
+                blocks.extend((0..count).map(|block| BlockId { file, block }));
+                continue;
+            };
+            for (number, channel) in index {
+                let count = match part(file, *number) {
+                    Some(ChannelPart::Beginning) => 1,
+                    Some(ChannelPart::Whole) => usize::MAX,
+                    None => 0,
+                };
+                blocks.extend(channel.blocks.iter().take(count).map(|block| BlockId { file, block: *block }));
+            }
+        }
+        self.prefetcher.limit_to(&blocks);
     }
 
     /// Sets the maximum size of the chunks that overlap in time, bytes.

@@ -83,10 +83,15 @@ impl Prefetcher {
         let files = Arc::clone(&self.files);
         let is_taken = |id: &BlockId| {
             let Some(layout) = files.get(id.file).map(|file| &file.layout) else { return false };
-            let begins = || layout.index.values().any(|channel| channel.block == id.block);
+            let begins = || layout.index.values().any(|channel| channel.blocks.first() == Some(&id.block));
             id.block < count || id.block + count >= layout.blocks.len() || begins()
         };
         self.order.retain(is_taken);
+    }
+
+    /// Keeps only these blocks.
+    pub(crate) fn limit_to(&mut self, blocks: &BTreeSet<BlockId>) {
+        self.order.retain(|id| blocks.contains(id));
     }
 
     /// Sets the maximum size of the blocks that are held, bytes.

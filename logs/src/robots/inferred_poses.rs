@@ -78,6 +78,11 @@ impl InferredPoses {
         Some(format!("tf ({} to {base})", self.odometry.map_frame(robot)?))
     }
 
+    /// Whether there are robots without a pose topic.
+    pub(crate) fn has_robots(&self) -> bool {
+        self.tf.robots().next().is_some()
+    }
+
     /// Whether the frame of a robot's map is needed and not known.
     pub(crate) fn asks_for_map(&self, robot: &str) -> bool {
         self.tf.knows(robot) && !self.mapped.contains(robot)

@@ -118,6 +118,21 @@ impl ChannelRouter {
         }
     }
 
+    /// Whether anything is derived with frames of tf or of maps.
+    pub(super) fn needs_frames(&self) -> bool {
+        self.derived.needs_frames()
+    }
+
+    /// Learns transforms of the log before they come; their frame names lack `prefix`.
+    pub(super) fn learn_transforms(&mut self, prefix: &str, is_static: bool, transforms: &TFMessage) {
+        self.derived.learn_ahead(prefix, is_static, transforms);
+    }
+
+    /// Learns the frame of a robot's map before it comes.
+    pub(super) fn learn_map_frame(&mut self, robot: &str, frame: &str) {
+        self.derived.set_map_frame(robot, frame);
+    }
+
     /// Sends the maps that were updated since they were last sent.
     pub(super) fn send_updated_maps(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
         self.derived.send_updated_maps(output)

@@ -8,6 +8,7 @@ mod latched;
 mod live_frames;
 mod live_router;
 pub mod map_file;
+mod preview;
 mod router;
 mod stage;
 pub mod topology_file;

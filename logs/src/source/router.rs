@@ -3,6 +3,7 @@
 use super::channel::Stamp;
 use super::channel_router::ChannelRouter;
 use super::latched::{Latch, LatchedMessage, LatchedMessages};
+use super::preview::learn_ahead;
 use super::{RobotMessages, RobotReading};
 use crate::names::{Names, Renamed};
 use crate::reader::{Damage, LogFile, LogMessage};
@@ -34,7 +35,8 @@ pub(crate) struct Router {
 }
 
 impl Router {
-    /// Creates a router for the messages of `files`. Whole maps are derived from map updates if `updates_maps`.
+    /// Creates a router for the messages of `files`. If `updates_maps`, whole maps are derived from map updates, and frames that
+    /// are logged late are read ahead.
     pub(crate) fn new(
         robots: RobotTopics,
         names: Names,
@@ -42,8 +44,12 @@ impl Router {
         updates_maps: bool,
         reading: RobotReading,
     ) -> Self {
+        let mut channels = ChannelRouter::new(robots, names.channels(), updates_maps, reading);
+        if updates_maps {
+            learn_ahead(&files, &names, &mut channels);
+        }
         Self {
-            channels: ChannelRouter::new(robots, names.channels(), updates_maps, reading),
+            channels,
             names,
             renamed: Vec::new(),
             by_number: vec![Vec::new(); files.len()],

@@ -16,6 +16,7 @@ use std::rc::Rc;
 mod inferred_poses;
 mod map_kinds;
 mod map_updates;
+mod preview;
 
 const ODOMETRY: &str = Odometry::NAME;
 const POSE_WITH_COVARIANCE: &str = PoseWithCovarianceStamped::NAME;

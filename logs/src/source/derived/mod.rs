@@ -10,6 +10,7 @@ mod updated_maps;
 use super::channel::Route;
 use super::{RobotMessages, RobotReading};
 use crate::robots::{PoseSource, RobotChannels, Role};
+use crate::tf::is_static;
 use gridweave_runtime::ros::{TFMessage, decode};
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
 use maps::DerivedMaps;
@@ -53,14 +54,35 @@ impl Derived {
         self.scans.expect_sensors(self.base_frame.as_deref());
     }
 
+    /// Whether anything is derived with frames of tf or of maps.
+    pub(super) fn needs_frames(&self) -> bool {
+        self.poses.needs_frames() || self.scans.needs_frames() || self.tags.needs_frames()
+    }
+
+    /// Learns transforms of the log before they come. Those that are not static show at most how a lidar is mounted; all else in
+    /// them moves.
+    pub(super) fn learn_ahead(&mut self, prefix: &str, is_static: bool, transforms: &TFMessage) {
+        self.scans.learn_transforms(prefix, is_static, transforms);
+        if is_static {
+            self.poses.learn_transforms(prefix, is_static, transforms);
+            self.tags.learn_transforms(prefix, is_static, transforms);
+        }
+    }
+
+    /// Sets the frame of a robot's map, unless it is known.
+    pub(super) fn set_map_frame(&mut self, robot: &str, frame: &str) {
+        self.poses.set_map_frame(robot, frame);
+    }
+
     /// Learns frames, maps and map updates from a message before the start.
     pub(super) fn learn(&mut self, route: &Route, roles: &RobotChannels, data: &[u8], output: &Output<RobotMessages>) {
         if route.role == Role::Tf
             && let Ok(transforms) = decode::<TFMessage>(data)
         {
-            self.poses.learn_transforms(route, &transforms);
-            self.tags.learn_transforms(route, &transforms);
-            self.scans.learn_transforms(route, &transforms);
+            let (prefix, is_static) = (&route.robot, is_static(&route.channel.topic));
+            self.poses.learn_transforms(prefix, is_static, &transforms);
+            self.tags.learn_transforms(prefix, is_static, &transforms);
+            self.scans.learn_transforms(prefix, is_static, &transforms);
         }
         self.poses.learn_map_frame(route, data);
         self.maps.update(route, roles, data, output);
@@ -118,9 +140,10 @@ impl Derived {
             output.warn(format!("messages on `{}` could not be read as transforms", route.channel.topic));
             return Ok(());
         };
-        self.scans.learn_transforms(route, &message);
-        self.poses.send_of_transforms(route, &message, output)?;
-        self.tags.send_of_transforms(route, &message, output)
+        let (prefix, is_static) = (&route.robot, is_static(&route.channel.topic));
+        self.scans.learn_transforms(prefix, is_static, &message);
+        self.poses.send_of_transforms(prefix, is_static, &message, output)?;
+        self.tags.send_of_transforms(prefix, is_static, &message, output)
     }
 
     /// Whether any pose was derived from transforms or odometry.

@@ -3,7 +3,7 @@
 use super::super::RobotMessages;
 use super::super::channel::Route;
 use crate::robots::{InferredPoses, NoPose, PoseSource, RobotChannels, Role, pose_with_covariance};
-use crate::tf::{TfPoses, is_static};
+use crate::tf::TfPoses;
 use gridweave_runtime::ros::{Header, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, TFMessage, decode};
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
 use std::collections::BTreeSet;
@@ -45,24 +45,37 @@ impl DerivedPoses {
             && self.inferred.asks_for_map(&route.robot)
             && let Ok(map) = decode::<OccupancyGrid<'_>>(data)
         {
-            self.inferred.set_map_frame(&route.robot, &map.header.frame_id);
+            self.set_map_frame(&route.robot, &map.header.frame_id);
         }
     }
 
+    /// Sets the frame of a robot's map, unless it is known.
+    pub(super) fn set_map_frame(&mut self, robot: &str, frame: &str) {
+        if self.inferred.asks_for_map(robot) {
+            self.inferred.set_map_frame(robot, frame);
+        }
+    }
+
+    /// Whether any pose is derived from transforms.
+    pub(super) fn needs_frames(&self) -> bool {
+        self.tf.is_some() || self.inferred.has_robots()
+    }
+
     /// Learns frames from transforms without sending anything.
-    pub(super) fn learn_transforms(&mut self, route: &Route, message: &TFMessage) {
-        self.poses_of_transforms(route, message);
-        self.odometry_of_transforms(route, message);
+    pub(super) fn learn_transforms(&mut self, prefix: &str, is_static: bool, message: &TFMessage) {
+        self.poses_of_transforms(prefix, is_static, message);
+        self.inferred.odometry(prefix, is_static, message);
     }
 
     /// Sends the poses and the odometry derived from transforms.
     pub(super) fn send_of_transforms(
         &mut self,
-        route: &Route,
+        prefix: &str,
+        is_static: bool,
         message: &TFMessage,
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
-        let (poses, unusable) = self.poses_of_transforms(route, message);
+        let (poses, unusable) = self.poses_of_transforms(prefix, is_static, message);
         for _ in 0..unusable {
             output.warn("transforms with values that are not finite, or between a frame and itself");
         }
@@ -70,7 +83,7 @@ impl DerivedPoses {
             self.has_inferred = true;
             output.pose.send(&robot, &PoseWithCovarianceStamped::from(pose))?;
         }
-        for (robot, pose) in self.odometry_of_transforms(route, message) {
+        for (robot, pose) in self.inferred.odometry(prefix, is_static, message) {
             self.has_odometry = true;
             output.odometry.send(&robot, &PoseWithCovarianceStamped::from(pose))?;
         }
@@ -127,17 +140,16 @@ impl DerivedPoses {
     }
 
     /// The poses from a message of transforms, and the number of unusable transforms.
-    fn poses_of_transforms(&mut self, route: &Route, message: &TFMessage) -> (Vec<(String, PoseStamped)>, usize) {
-        let Route { robot, channel, .. } = route;
+    fn poses_of_transforms(
+        &mut self,
+        prefix: &str,
+        is_static: bool,
+        message: &TFMessage,
+    ) -> (Vec<(String, PoseStamped)>, usize) {
         match &mut self.tf {
-            Some(tf) => tf.update(robot, is_static(&channel.topic), message),
-            None => self.inferred.transforms(robot, is_static(&channel.topic), message),
+            Some(tf) => tf.update(prefix, is_static, message),
+            None => self.inferred.transforms(prefix, is_static, message),
         }
-    }
-
-    /// The odometry of robots with scans, from a message of transforms.
-    fn odometry_of_transforms(&mut self, route: &Route, message: &TFMessage) -> Vec<(String, PoseStamped)> {
-        self.inferred.odometry(&route.robot, is_static(&route.channel.topic), message)
     }
 
     /// Whether any pose was derived from transforms or odometry.

@@ -3,7 +3,6 @@
 use super::super::RobotMessages;
 use super::super::channel::Route;
 use crate::robots::{LidarPoses, RobotChannels, Scans, read_scan};
-use crate::tf::is_static;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::TFMessage;
 use gridweave_runtime::stage::{Output, StageError};
@@ -35,10 +34,15 @@ impl DerivedScans {
         self.scans.get_or_insert_with(|| Scans::new(base_frame, self.lidars.clone()));
     }
 
-    /// Learns the mounting poses of lidars.
-    pub(super) fn learn_transforms(&mut self, route: &Route, message: &TFMessage) {
+    /// Whether the mounting poses of lidars are needed.
+    pub(super) fn needs_frames(&self) -> bool {
+        self.scans.is_some()
+    }
+
+    /// Learns the mounting poses of lidars from transforms whose frame names lack `prefix`.
+    pub(super) fn learn_transforms(&mut self, prefix: &str, is_static: bool, message: &TFMessage) {
         if let Some(scans) = &mut self.scans {
-            scans.transforms(&route.robot, is_static(&route.channel.topic), message);
+            scans.transforms(prefix, is_static, message);
         }
     }
 

@@ -3,7 +3,6 @@
 use super::super::RobotMessages;
 use super::super::channel::Route;
 use crate::robots::{Measurement, NoTransform, RobotChannels, TagPositions};
-use crate::tf::is_static;
 use gridweave_runtime::ros::{Header, TFMessage, TagPosition, TagRange};
 use gridweave_runtime::stage::{Output, StageError};
 use std::collections::BTreeSet;
@@ -35,19 +34,25 @@ impl DerivedTags {
         self.positions.get_or_insert_with(|| TagPositions::new(base_frame, BTreeSet::new()));
     }
 
+    /// Whether the mounting poses of cameras are needed.
+    pub(super) fn needs_frames(&self) -> bool {
+        self.positions.is_some()
+    }
+
     /// Learns frames from transforms without sending anything.
-    pub(super) fn learn_transforms(&mut self, route: &Route, message: &TFMessage) {
-        self.positions_of_transforms(route, message);
+    pub(super) fn learn_transforms(&mut self, prefix: &str, is_static: bool, message: &TFMessage) {
+        self.positions_of_transforms(prefix, is_static, message);
     }
 
     /// Sends the tag positions derived from transforms.
     pub(super) fn send_of_transforms(
         &mut self,
-        route: &Route,
+        prefix: &str,
+        is_static: bool,
         message: &TFMessage,
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
-        for (robot, position) in self.positions_of_transforms(route, message) {
+        for (robot, position) in self.positions_of_transforms(prefix, is_static, message) {
             self.send_position(&robot, "of an AprilTag", position, output)?;
         }
         Ok(())
@@ -56,11 +61,12 @@ impl DerivedTags {
     /// The tag positions in a message of transforms.
     fn positions_of_transforms(
         &mut self,
-        route: &Route,
+        prefix: &str,
+        is_static: bool,
         message: &TFMessage,
     ) -> Vec<(String, Result<TagPosition, NoTransform>)> {
         let Some(positions) = &mut self.positions else { return Vec::new() };
-        positions.transforms(&route.robot, is_static(&route.channel.topic), message)
+        positions.transforms(prefix, is_static, message)
     }
 
     /// Sends the tag readings in a message of another type.

@@ -1,0 +1,66 @@
+//! What holds from the beginning of a log, though it is logged later: where sensors are mounted, and the frames of maps.
+//!
+//! A program that joins a live robot receives the static transforms and the last map before anything else. A recorder writes
+//! them when they come: a driver that starts after its robot, or a map that is first published after a minute, would leave what
+//! was recorded before it without a mount or a map frame.
+
+use super::channel_router::ChannelRouter;
+use crate::names::Names;
+use crate::reader::{ChannelPart, LogFile, LogReader};
+use crate::robots::Role;
+use crate::tf::is_static;
+use gridweave_runtime::ros::{Header, TFMessage, decode};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+/// Teaches `router` the static transforms of the files, the first transforms of others, and the frames of the first maps.
+pub(super) fn learn_ahead(files: &Arc<[LogFile]>, names: &Names, router: &mut ChannelRouter) {
+    if !router.needs_frames() {
+        return;
+    }
+    let mut wanted = BTreeMap::new();
+    for (file, log) in files.iter().enumerate() {
+        for (number, _) in log.channels() {
+            let Some(channel) = names.channel(file, number).filter(|_| names.wants(file, number)) else { continue };
+            let classified = router.roles().classify(channel);
+            let ahead = match classified.role {
+                Role::Tf if is_static(&channel.topic) => Ahead::StaticTransforms,
+                Role::Tf => Ahead::Transforms,
+                Role::Map => Ahead::Map,
+                _ => continue,
+            };
+            wanted.insert((file, number), (classified.robot.to_owned(), ahead));
+        }
+    }
+    let mut reader = LogReader::of(Arc::clone(files));
+    reader.limit_to(|file, number| match wanted.get(&(file, number))? {
+        (_, Ahead::StaticTransforms) => Some(ChannelPart::Whole),
+        (_, Ahead::Transforms | Ahead::Map) => Some(ChannelPart::Beginning),
+    });
+    // What comes first holds from the beginning; what replaces it later is learnt when it comes.
+    let mut placed = BTreeSet::new();
+    let mut renamed = Vec::new();
+    while let Some(message) = reader.next_message() {
+        let Some((robot, ahead)) = wanted.get(&(message.file, message.channel)) else { continue };
+        let data = names.named(&message, &mut renamed);
+        if *ahead == Ahead::Map {
+            if let Ok(header) = decode::<Header>(data) {
+                router.learn_map_frame(robot, &header.frame_id);
+            }
+        } else if let Ok(mut message) = decode::<TFMessage>(data) {
+            message.transforms.retain(|edge| placed.insert((robot.clone(), edge.child_frame_id.clone())));
+            router.learn_transforms(robot, *ahead == Ahead::StaticTransforms, &message);
+        }
+    }
+}
+
+/// What a channel shows ahead of its messages.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Ahead {
+    /// Transforms that hold for the whole log.
+    StaticTransforms,
+    /// Transforms that hold for a while.
+    Transforms,
+    /// The frame of a map.
+    Map,
+}
