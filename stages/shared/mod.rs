@@ -4,6 +4,7 @@ pub mod deformation;
 pub mod geometry;
 pub mod log_odds;
 pub mod placement;
+pub mod robot_clock;
 pub mod robot_maps;
 pub mod robot_pair;
 pub mod scan_grid;

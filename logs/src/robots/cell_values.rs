@@ -1,22 +1,21 @@
 //! Conventions in which programs write the cells of an occupancy grid, and their translation to that of ROS map servers: -1
 //! unknown, 0 free to 100 occupied.
 
+mod bytes;
+mod costmap;
+
+use bytes::ByteValues;
+use costmap::{obstacles_are_inflated, without_costs};
 use gridweave_runtime::ros::{MapMetaData, OccupancyGrid, cell, decode, encode};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 use std::fmt;
 
 /// The value of a cell in a costmap whose obstacle the robot's centre must not be nearer to (nav2's inscribed cost).
 const INSCRIBED: i8 = 99;
 /// The value of an obstacle, in costmaps and in maps.
 const LETHAL: i8 = 100;
-/// The least cost of a known cell beside an obstacle of a costmap.
-const BESIDE_LETHAL: i8 = 90;
-/// The share of known cells beside obstacles that have at least this cost in a costmap.
-const COSTMAP_SHARE: f64 = 0.9;
 /// Two classes of values explain more of their variance than this: as much as they explain of values that are spread evenly.
 const EVEN_SPREAD: f64 = 0.75;
 /// The least difference of the means of two classes of values, if they are not 0 and one other value.
@@ -27,7 +26,8 @@ const LEAST_CONTRAST: f64 = 20.0;
 #[serde(rename_all = "snake_case")]
 pub enum CellValues {
     /// By the distribution of the values in each map: as `occupancy` where some cells are occupied and some free; as `costmap`
-    /// where obstacles are inflated; else as `two_classes` where the values fall into two classes.
+    /// where obstacles are inflated; else as `two_classes` where the values fall into two classes. Values outside -1 to 100 are read
+    /// as those of an image or of a costmap from 0 to 255, where they fit, and else as unknown.
     #[default]
     Auto,
     /// As map servers write them: occupied from 65 to 100, free below 25.
@@ -79,16 +79,23 @@ impl CellValues {
         (read, convention)
     }
 
-    /// A map message in the convention of map servers, and the convention that it was in; `None` if it is in it, or is no map.
-    pub(crate) fn translate(self, message: &[u8]) -> Option<(Vec<u8>, Convention)> {
+    /// A map message in the convention of map servers, and what its values were read as; `None` if it is in it, or is no map.
+    pub(crate) fn translate(self, message: &[u8]) -> Option<(Vec<u8>, Vec<String>)> {
         let map: OccupancyGrid<'_> = decode(message).ok()?;
         let cells = map.cells();
         if (map.info.width as usize).checked_mul(map.info.height as usize) != Some(cells.len()) {
             return None;
         }
-        let (Cow::Owned(read), convention) = self.read(&map.info, cells) else { return None };
+        let bytes = ByteValues::of(cells).filter(|_| self == Self::Auto);
+        let in_range = bytes.map_or(Cow::Borrowed(cells), |bytes| Cow::Owned(bytes.read(cells)));
+        let (read, convention) = self.read(&map.info, &in_range);
+        let is_other = matches!(read, Cow::Owned(_));
+        if bytes.is_none() && !is_other {
+            return None;
+        }
+        let notes = bytes.map(|bytes| bytes.to_string()).into_iter().chain(is_other.then(|| convention.to_string()));
         let translated = OccupancyGrid { data: bytemuck::cast_slice(&read), ..map };
-        Some((encode(&translated).ok()?, convention))
+        Some((encode(&translated).ok()?, notes.collect()))
     }
 
     fn convention(self, width: usize, cells: &[i8]) -> Convention {
@@ -162,63 +169,6 @@ impl Counts {
         let is_contrast = is_binary || high - low >= LEAST_CONTRAST;
         (between > EVEN_SPREAD * variance && is_contrast && above < below).then_some((low, high))
     }
-}
-
-/// The neighbours of a cell that share an edge with it.
-fn neighbours(width: usize, length: usize, index: usize) -> impl Iterator<Item = usize> {
-    let column = index % width.max(1);
-    let left = (column > 0).then(|| index - 1);
-    let right = (column + 1 < width).then_some(index + 1);
-    let (down, up) = (index.checked_sub(width), Some(index + width));
-    [left, right, down, up].into_iter().flatten().filter(move |neighbour| *neighbour < length)
-}
-
-/// Whether known cells beside obstacles have high costs.
-fn obstacles_are_inflated(width: usize, cells: &[i8]) -> bool {
-    let (mut known, mut inflated) = (0_u64, 0_u64);
-    for (index, _) in cells.iter().enumerate().filter(|(_, value)| **value == LETHAL) {
-        for beside in neighbours(width, cells.len(), index).map(|neighbour| cells[neighbour]) {
-            if cell::is_known(beside) && beside != LETHAL {
-                known += 1;
-                inflated += u64::from(beside >= BESIDE_LETHAL);
-            }
-        }
-    }
-    known > 0 && inflated as f64 >= COSTMAP_SHARE * known as f64
-}
-
-/// The cells of a costmap without the costs around obstacles: free on the side from which the cost falls to that of free space,
-/// unknown on the side from which it falls to unknown cells. The sides are found by flooding the costs from both (the watershed
-/// of Meyer, "Topographic distance and watershed lines", 1994); obstacles are the ridges between them.
-fn without_costs(width: usize, cells: &[i8]) -> Vec<i8> {
-    let is_cost = |value: i8| (1..LETHAL).contains(&value);
-    let mut read: Vec<i8> = cells.iter().map(|value| if is_cost(*value) { i8::MIN } else { *value }).collect();
-    read.iter_mut().filter(|value| !cell::is_known(**value) && **value != i8::MIN).for_each(|value| *value = -1);
-    let mut queue = BinaryHeap::new();
-    let mut order = 0_u64;
-    let mut flood = |from: usize, read: &mut [i8], queue: &mut BinaryHeap<Reverse<(i8, u64, usize)>>| {
-        for next in neighbours(width, cells.len(), from) {
-            if read[next] == i8::MIN {
-                read[next] = read[from];
-                order += 1;
-                queue.push(Reverse((cells[next], order, next)));
-            }
-        }
-    };
-    // Free space goes first: where a cost lies between both sides, something has seen it.
-    for side in [0, cell::UNKNOWN] {
-        for index in 0..cells.len() {
-            if read[index] == side && !is_cost(cells[index]) {
-                flood(index, &mut read, &mut queue);
-            }
-        }
-    }
-    while let Some(Reverse((_, _, index))) = queue.pop() {
-        flood(index, &mut read, &mut queue);
-    }
-    // What neither side reaches lies within obstacles.
-    read.iter_mut().filter(|value| **value == i8::MIN).for_each(|value| *value = cell::UNKNOWN);
-    read
 }
 
 #[cfg(test)]

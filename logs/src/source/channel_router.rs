@@ -212,8 +212,8 @@ impl ChannelRouter {
                 route.send(stamp, data, &output.other, log_time)
             }
             _ => match self.map_values.translate(data) {
-                Some((translated, convention)) => {
-                    output.warn(format!("maps on `{topic}`: {convention}"));
+                Some((translated, notes)) => {
+                    notes.iter().for_each(|note| output.warn(format!("maps on `{topic}`: {note}")));
                     route.send(stamp, &translated, &output.map, log_time)
                 }
                 None => route.send(stamp, data, &output.map, log_time),

@@ -4,6 +4,7 @@ use super::scan_odometry::ScanOdometry;
 use super::slam_map::{LostScans, SlamMap};
 use super::{ScanBeams, ScanMap, ScanMapperParameters, TooLarge};
 use crate::shared::geometry::{Point2, Pose2, pose};
+use crate::shared::robot_clock::RobotClock;
 use crate::shared::scan_grid::SnapshotMap;
 use crate::tags::tag_localizer::{PoseTrack, Position};
 use gridweave_runtime::message::LogTime;
@@ -39,6 +40,7 @@ pub(super) enum ScanOutcome {
 
 /// A robot whose map is built.
 pub(super) struct Robot {
+    pub(super) clock: RobotClock,
     localization: Localization,
     poses: PoseTrack,
     odometry: PoseTrack,
@@ -57,6 +59,7 @@ pub(super) struct Robot {
 impl Robot {
     pub(super) fn new() -> Self {
         Self {
+            clock: RobotClock::default(),
             localization: Localization::NotYet,
             poses: PoseTrack::default(),
             odometry: PoseTrack::default(),

@@ -3,7 +3,7 @@
 use super::robot::{Robot, ScanOutcome};
 use super::{MappingMode, ScanBeams, ScanMapperParameters};
 use crate::shared::geometry::Pose2;
-use crate::tags::tag_localizer::time_of;
+use crate::shared::robot_clock::Leap;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, RangeScan, UnmergedRobot};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
@@ -64,9 +64,10 @@ impl ScanMapper {
         message: Received<'_, PoseWithCovarianceStamped>,
         output: &Output<Drawn>,
     ) -> Result<(), StageError> {
-        let time = time_of(message.header.stamp, message.log_time());
         let parameters = self.parameters;
         let Some(robot) = self.robot(message.robot(), output) else { return Ok(()) };
+        let (time, leap) = robot.clock.time("pose", message.header.stamp, message.log_time());
+        warn_of_leap(message.robot(), leap, output);
         let frame = robot.frame.get_or_insert_with(|| message.header.frame_id.clone());
         if *frame != message.header.frame_id {
             output.warn(format!(
@@ -92,10 +93,11 @@ impl ScanMapper {
         message: Received<'_, PoseWithCovarianceStamped>,
         output: &Output<Drawn>,
     ) -> Result<(), StageError> {
-        let time = time_of(message.header.stamp, message.log_time());
         let parameters = self.parameters;
         let is_offline = parameters.mode == MappingMode::Offline;
         let Some(robot) = self.robot(message.robot(), output) else { return Ok(()) };
+        let (time, leap) = robot.clock.time("odometry", message.header.stamp, message.log_time());
+        warn_of_leap(message.robot(), leap, output);
         let pose = message.pose.pose.planar();
         if !is_finite(&pose) || !robot.add_odometry(time, &pose, is_offline) {
             output.warn(format!("odometry of {} that is not finite or late is left out", message.robot()));
@@ -110,10 +112,11 @@ impl ScanMapper {
     }
 
     fn receive_scan(&mut self, message: Received<'_, RangeScan>, output: &Output<Drawn>) -> Result<(), StageError> {
-        let time = time_of(message.header.stamp, message.log_time());
         let scan = ScanBeams::of(&message, &self.parameters);
         let parameters = self.parameters;
         let Some(robot) = self.robot(message.robot(), output) else { return Ok(()) };
+        let (time, leap) = robot.clock.time("scan", message.header.stamp, message.log_time());
+        warn_of_leap(message.robot(), leap, output);
         let Some(scan) = scan else {
             output.warn(format!("scans of {} with angles or times that are not finite are left out", message.robot()));
             return Ok(());
@@ -219,6 +222,12 @@ impl ScanMapper {
             }
         }
         Ok(())
+    }
+}
+
+fn warn_of_leap(name: &str, leap: Option<Leap>, output: &Output<Drawn>) {
+    if let Some(leap) = leap {
+        output.warn(leap.warning(name));
     }
 }
 

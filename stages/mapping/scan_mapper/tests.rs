@@ -3,7 +3,7 @@
 use super::kind;
 use super::test_drive::{BEAMS, CELL, TURN, at, scan, still_ranges, to_wall, truth};
 use crate::shared::geometry::{Grid, GridGeometry, Point2, Pose2, is_free, is_occupied, pose};
-use gridweave_runtime::message::Message;
+use gridweave_runtime::message::{LogTime, Message};
 use gridweave_runtime::ros::{
     Header, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, RangeScan, RosMessage, UnmergedRobot,
 };
@@ -92,6 +92,32 @@ fn walls_are_within_a_cell_of_where_they_are_though_the_robot_turns_during_a_sca
     let (_, as_if_still) = drive_by_poses(0.0);
     let as_if_still = measure(&as_if_still.unwrap(), &map_frame());
     assert!(as_if_still.mean > 2.0 * drawn.mean, "{} {}", as_if_still.mean, drawn.mean);
+}
+
+#[test]
+fn stamps_that_leap_do_not_cost_the_map() {
+    let mut bench = Bench::new("");
+    for tick in 0..200 {
+        let seconds = 0.05 * f64::from(tick);
+        let (log_time, pose) = (at(seconds), map_frame().inverse() * truth(seconds));
+        // The clock starts again half-way; one pose has no stamp, and one scan one of the future.
+        let stamp = if tick < 100 { at(seconds + 100.0) } else { at(seconds - 4.0) };
+        let pose_stamp = if tick == 30 { LogTime::MIN } else { stamp };
+        let scan_stamp = if tick == 40 { at(1e6) } else { stamp };
+        let stamped = PoseStamped { header: Header::new(pose_stamp, "robot1/map"), pose: pose.into() };
+        bench.0.give::<PoseWithCovarianceStamped>("pose", "robot1", log_time, &stamped.into()).unwrap();
+        if tick % 2 == 0 {
+            let mut scan = RangeScan { time_increment: TURN / BEAMS as f64, ..scan(seconds) };
+            scan.header.stamp = scan_stamp.into();
+            bench.0.give::<RangeScan>("scan", "robot1", log_time, &scan).unwrap();
+        }
+    }
+    let drawn = measure(&bench.map(10.0).0.unwrap(), &map_frame());
+    assert!(drawn.greatest < CELL, "{}", drawn.greatest);
+    assert!(drawn.occupied > 500 && drawn.free > 15_000, "{} {}", drawn.occupied, drawn.free);
+    let warnings = bench.0.warnings();
+    let leaps = warnings.iter().find(|(warning, _)| warning.starts_with("the stamps of robot1 leap"));
+    assert_eq!(leaps.map(|(_, times)| *times), Some(2), "{warnings:?}");
 }
 
 #[test]

@@ -51,4 +51,3 @@ pub use reading_groups::{Reading, ReadingGroups};
 pub use ring_product::{Ring, RingProduct};
 pub use sighting_groups::{Sighting, SightingGroups};
 pub use stage::kind;
-pub(crate) use stage::time_of;

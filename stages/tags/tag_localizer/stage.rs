@@ -5,6 +5,7 @@ use super::{
     position_covariance,
 };
 use crate::shared::geometry::Point2;
+use crate::shared::robot_clock::RobotClock;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{
     Header, PoseStamped, PoseWithCovarianceStamped, TagBearing, TagEstimate, TagEstimates, TagPosition, TagRange, Time,
@@ -49,6 +50,7 @@ struct TagLocalizerStage {
 
 struct Robot {
     localizer: TagLocalizer,
+    clock: RobotClock,
     /// Largest distance at which a tag is read, metres.
     reach: f64,
     frame_id: Option<String>,
@@ -128,6 +130,7 @@ impl TagLocalizerStage {
         let parameters = &self.parameters;
         Some(self.robots.entry(name.to_owned()).or_insert_with(|| Robot {
             localizer: TagLocalizer::new(parameters.clone()),
+            clock: RobotClock::default(),
             reach: parameters.reach,
             frame_id: None,
             sent: false,
@@ -183,7 +186,7 @@ impl Robot {
         let yaw = pose.pose.pose.planar().rotation.angle();
         let yaw_variance = heading_variance(yaw_variance);
         let position = Position { place, covariance, yaw, yaw_variance };
-        let time = time_of(header.stamp, pose.log_time());
+        let time = self.time(name, "pose", header.stamp, pose.log_time(), output);
         if !self.localizer.add_pose(time, position, |problem| output.warn(problem.to_string())) {
             output.warn("poses that are older than the one before are left out");
         }
@@ -193,15 +196,31 @@ impl Robot {
         }
     }
 
+    /// The time of a message of this kind on the clock of the robot.
+    fn time(
+        &mut self,
+        name: &str,
+        kind: &'static str,
+        stamp: Time,
+        log_time: LogTime,
+        output: &Output<Estimates>,
+    ) -> LogTime {
+        let (time, leap) = self.clock.time(kind, stamp, log_time);
+        if let Some(leap) = leap {
+            output.warn(leap.warning(name));
+        }
+        time
+    }
+
     fn add_reading(&mut self, reading: &Received<'_, TagRange>, output: &Output<Estimates>) {
-        let time = time_of(reading.header.stamp, reading.log_time());
+        let time = self.time(reading.robot(), "range", reading.header.stamp, reading.log_time(), output);
         if let Err(problem) = self.localizer.add_reading(time, &reading.tag_id, reading.range, reading.range_stddev) {
             output.warn(problem.to_string());
         }
     }
 
     fn add_position(&mut self, seen: &Received<'_, TagPosition>, output: &Output<Estimates>) {
-        let time = time_of(seen.header.stamp, seen.log_time());
+        let time = self.time(seen.robot(), "position", seen.header.stamp, seen.log_time(), output);
         let [xx, xy, yx, yy] = seen.covariance;
         let (place, covariance) = (Vector2::new(seen.x, seen.y), Matrix2::new(xx, xy, yx, yy));
         if let Err(problem) = self.localizer.add_sighting(time, &seen.tag_id, place, &covariance) {
@@ -210,7 +229,7 @@ impl Robot {
     }
 
     fn add_bearing(&mut self, seen: &Received<'_, TagBearing>, output: &Output<Estimates>) {
-        let time = time_of(seen.header.stamp, seen.log_time());
+        let time = self.time(seen.robot(), "bearing", seen.header.stamp, seen.log_time(), output);
         let sensor = Vector2::new(seen.x, seen.y);
         if let Err(problem) = self.localizer.add_bearing(time, &seen.tag_id, sensor, seen.bearing, seen.bearing_stddev)
         {
@@ -240,13 +259,5 @@ impl Robot {
         }
         let header = Header::new(output.log_time(), frame_id);
         output.estimates.send(name, &TagEstimates { header, robot: name.to_owned(), tags })
-    }
-}
-
-/// Time of a message: that of its header or, if it has none, its log time.
-pub(crate) fn time_of(stamp: Time, log_time: LogTime) -> LogTime {
-    match LogTime::from(stamp) {
-        LogTime::MIN => log_time,
-        time => time,
     }
 }

@@ -34,6 +34,22 @@ fn cells_of_0_and_1_are_free_and_occupied_unless_the_pipeline_keeps_them() {
 }
 
 #[test]
+fn the_pixels_of_an_image_are_read_as_such_and_other_values_out_of_range_are_named() {
+    let log = |log: &mut TestLog| {
+        log.add("/a/map", OccupancyGrid::NAME, 1, &map("map", &[205, 205, 254, 254, 0]));
+        log.add("/b/map", OccupancyGrid::NAME, 2, &map("map", &[0, 150, 0, 1, 0]));
+    };
+    let converted = read(&log, "");
+    assert_eq!(cells(&converted), [[255, 255, 0, 0, 100], [0, 255, 0, 100, 0]]);
+    let warnings = [
+        "maps on `/a/map`: cells have the values of an image: 0 is read as occupied, 205 as unknown, 254 and 255 as free",
+        "maps on `/b/map`: cells with values outside -1 to 100 are read as unknown",
+        "maps on `/b/map`: values about 0 are read as free, values about 1 as occupied",
+    ];
+    assert!(warnings.iter().all(|warning| converted.warnings.contains_key(*warning)), "{:?}", converted.warnings);
+}
+
+#[test]
 fn a_merged_map_of_another_program_is_no_robot_wherever_it_comes() {
     let grid = [0, 0, 100, 0];
     let all = [("/map_merge/map", "world"), ("/a/map", "map"), ("/b/map", "b/map")];
