@@ -24,8 +24,8 @@ enum Frames {
     /// Unchanged, or there are none.
     AsLogged,
     /// Put under a robot (unchanged if empty), with stamps shifted `later` by nanoseconds. With `is_map`, an empty
-    /// frame name is the map frame.
-    OfRobot { robot: String, is_map: bool, later: i64, recoder: Recoder },
+    /// frame name is the map frame. Frames that have the name `logged_as` of the robot in the log get the other instead.
+    OfRobot { robot: String, logged_as: Option<String>, is_map: bool, later: i64, recoder: Recoder },
     /// Unchanged, because the definition of the messages cannot be used, for this reason.
     Unknown(String),
 }
@@ -52,13 +52,21 @@ impl NamedChannel {
                 Ok(schema) => match Recoder::new(schema) {
                     None => Frames::Unknown("they contain wstring fields".to_owned()),
                     Some(recoder) if recoder.names_frames() || later != 0 && recoder.has_stamps() => {
-                        Frames::OfRobot { robot, is_map, later, recoder }
+                        Frames::OfRobot { robot, logged_as: None, is_map, later, recoder }
                     }
                     Some(_) => Frames::AsLogged,
                 },
             },
         };
         Self { channel, is_wanted, frames, shared: None }
+    }
+
+    /// The same channel, in a log that has another name for the robot.
+    pub(super) fn logged_as(mut self, name: Option<&str>) -> Self {
+        if let Frames::OfRobot { logged_as, .. } = &mut self.frames {
+            *logged_as = name.map(str::to_owned);
+        }
+        self
     }
 
     /// Whether the channel has the transforms of all robots.
@@ -75,7 +83,9 @@ impl NamedChannel {
     /// The new name of a frame in the channel's messages.
     pub(super) fn frame<'a>(&self, frame: &'a str) -> Cow<'a, str> {
         match &self.frames {
-            Frames::OfRobot { robot, is_map, .. } => name(robot, frame, if *is_map { "map" } else { "" }),
+            Frames::OfRobot { robot, logged_as, is_map, .. } => {
+                name(robot, logged_as.as_deref(), frame, if *is_map { "map" } else { "" })
+            }
             Frames::AsLogged | Frames::Unknown(_) => Cow::Borrowed(frame),
         }
     }
@@ -100,10 +110,12 @@ impl NamedChannel {
     }
 
     fn put_under_robot(&self, message: &[u8], copy: &mut Vec<u8>) -> Renamed {
-        let Frames::OfRobot { robot, is_map, later, recoder } = &self.frames else { return Renamed::AsLogged };
+        let Frames::OfRobot { robot, logged_as, is_map, later, recoder } = &self.frames else {
+            return Renamed::AsLogged;
+        };
         copy.clear();
         let unnamed = if *is_map { "map" } else { "" };
-        match recoder.rename_frames(message, &|frame| name(robot, frame, unnamed), *later, copy) {
+        match recoder.rename_frames(message, &|frame| name(robot, logged_as.as_deref(), frame, unnamed), *later, copy) {
             Ok(true) => Renamed::Copied,
             Ok(false) => Renamed::AsLogged,
             Err(_) => Renamed::Unreadable,
@@ -111,10 +123,12 @@ impl NamedChannel {
     }
 }
 
-/// The name of a robot's frame. An empty frame name is replaced by `unnamed`.
-fn name<'a>(robot: &str, frame: &'a str, unnamed: &'static str) -> Cow<'a, str> {
-    match robot {
-        "" => Cow::Borrowed(frame),
-        robot => frame_of_robot(robot, if frame.is_empty() { unnamed } else { frame }),
+/// The name of a frame of a robot that the log may call `logged_as`. An empty frame name is replaced by `unnamed`.
+fn name<'a>(robot: &str, logged_as: Option<&str>, frame: &'a str, unnamed: &'static str) -> Cow<'a, str> {
+    if robot.is_empty() {
+        return Cow::Borrowed(frame);
     }
+    let frame = if frame.is_empty() { unnamed } else { frame };
+    let own = logged_as.and_then(|logged| frame.trim_start_matches('/').strip_prefix(logged)?.strip_prefix(['/', '_']));
+    frame_of_robot(robot, own.unwrap_or(frame))
 }

@@ -3,6 +3,7 @@
 use super::file_names::FileNameError;
 use crate::reader::ReadError;
 use gridweave_runtime::pipeline::suggest;
+use std::path::PathBuf;
 
 /// The error when logs cannot be opened or named.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +26,21 @@ pub enum NameError {
         one: String,
         /// The other one.
         other: String,
+    },
+    /// Two logs of one time have maps of robots with one name, which would be taken for one robot.
+    #[error(
+        "both {one} and {other} have maps of `{robot}` at the same time: if these are two robots, name them: A={one} B={other}; if \
+         they are one, give one of the logs",
+        one = .one.display(),
+        other = .other.display()
+    )]
+    OneNameForTwo {
+        /// The robot.
+        robot: String,
+        /// One of the logs.
+        one: PathBuf,
+        /// The other one.
+        other: PathBuf,
     },
     /// A selected robot is not in the logs.
     #[error("there is no robot `{robot}` in the logs: {}", listed(.known))]

@@ -14,6 +14,7 @@ mod error;
 mod file_names;
 mod infer_robots;
 mod input;
+mod logged_name;
 mod naming;
 mod rename;
 mod rename_advice;

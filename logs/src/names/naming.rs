@@ -2,6 +2,7 @@
 
 use super::channel::NamedChannel;
 use super::infer_robots::infer_robots;
+use super::logged_name::LoggedName;
 use super::rules::fits;
 use super::{Convention, Input, NameError, NameRules, Names};
 use crate::reader::LogFile;
@@ -24,6 +25,17 @@ struct Draft {
     robot: Option<String>,
 }
 
+impl Draft {
+    /// Takes the name of the robot in the log off the topic.
+    fn strip(&mut self, logged_as: Option<&str>) {
+        let rest =
+            logged_as.and_then(|name| self.channel.topic.strip_prefix('/')?.strip_prefix(name)?.strip_prefix('/'));
+        if let Some(rest) = rest.filter(|_| shared_topic(&self.channel).is_none()) {
+            self.channel.topic = format!("/{rest}");
+        }
+    }
+}
+
 /// Names the channels of `files`, where `input_of` is the index of the input that each file belongs to.
 pub(super) fn name(
     files: &[LogFile],
@@ -43,14 +55,21 @@ pub(super) fn name(
         Convention::AsLogged => (inputs.iter().map(|input| input.robot.clone()).collect(), None),
         Convention::ByRobot => infer_robots(inputs, &of_inputs, robots)?,
     };
-    let note = [note, already_named(inputs, &of_inputs, rules, robots)];
-    let note = note.into_iter().flatten().reduce(|one, other| format!("{one}; {other}"));
+    let logged_names: Vec<LoggedName> =
+        inputs.iter().zip(&of_inputs).map(|(input, channels)| LoggedName::of(input, channels, rules, robots)).collect();
+    let notes = inputs.iter().zip(&logged_names).filter_map(|(input, logged)| logged.note(input));
+    let note = note.into_iter().chain(notes).reduce(|one, other| format!("{one}; {other}"));
     let robot_of_file: Vec<Option<String>> =
         input_of.iter().map(|&input| of_input.get(input).cloned().flatten()).collect();
+    let logged_as = |file: usize| input_of.get(file).and_then(|&input| logged_names.get(input)?.other());
+    drafts.iter_mut().for_each(|draft| draft.strip(logged_as(draft.file)));
     put_under_robots(&mut drafts, &robot_of_file, rules);
     check_renamed(&drafts)?;
 
     let roles = RobotChannels::new(robots.clone(), drafts.iter().map(|draft| &draft.channel));
+    if rules.convention == Convention::ByRobot {
+        check_robots(&drafts, &roles, files, input_of, inputs)?;
+    }
     let known = known_robots(&roles, &drafts);
     if let Some(unknown) = rules.robots.iter().find(|robot| !known.contains(robot.as_str())) {
         return Err(NameError::NoSuchRobot { robot: unknown.clone(), known: known.into_iter().collect() });
@@ -75,33 +94,11 @@ pub(super) fn name(
         let is_wanted = rules.wants(&channel.topic, robot_of(&known, robots, &channel.topic));
         if let Some(of_file) = channels.get_mut(file) {
             let later = files.get(file).map_or(0, LogFile::later);
-            of_file.insert(number, NamedChannel::new(channel, robot, is_map, later, is_wanted));
+            of_file
+                .insert(number, NamedChannel::new(channel, robot, is_map, later, is_wanted).logged_as(logged_as(file)));
         }
     }
     Ok(Names { channels, robots: robot_of_file, note })
-}
-
-/// A note for the user if a log was assigned to one robot and its topics contain the names of others. With a second
-/// robot name in front, its maps match no robot.
-fn already_named(
-    inputs: &[Input],
-    of_inputs: &[Vec<&Channel>],
-    rules: &NameRules,
-    robots: &RobotTopics,
-) -> Option<String> {
-    let of_input = |(input, channels): (&Input, &Vec<&Channel>)| {
-        let robot = input.robot.as_ref().filter(|_| rules.convention == Convention::ByRobot)?;
-        let roles = RobotChannels::new(robots.clone(), channels.iter().copied());
-        let maps = || channels.iter().map(|channel| roles.classify(channel)).filter(|found| found.role == Role::Map);
-        let named: BTreeSet<&str> = maps().map(|found| found.robot).filter(|named| named != robot).collect();
-        let (path, first) = (input.path.display(), named.first()?);
-        Some(format!(
-            "the topics of {path} already contain robot names ({}), and `{robot}` is put before them: omit \
-             `{robot}=`, or use `--rename /{first}/map=/map` to make one of them {robot}'s",
-            named.iter().copied().collect::<Vec<_>>().join(", ")
-        ))
-    };
-    inputs.iter().zip(of_inputs).find_map(of_input)
 }
 
 /// The channels of all files, with the user's renames applied.
@@ -155,6 +152,35 @@ fn check_renamed(drafts: &[Draft]) -> Result<(), NameError> {
             let [topic, one, other] = [&draft.channel.topic, &known.logged, &draft.logged].map(String::clone);
             return Err(NameError::OneTopicForTwo { topic, one, other });
         }
+    }
+    Ok(())
+}
+
+/// The maps of two robots would be taken for those of one if both have one name. The logs of one robot follow each other.
+fn check_robots(
+    drafts: &[Draft],
+    roles: &RobotChannels,
+    files: &[LogFile],
+    input_of: &[usize],
+    inputs: &[Input],
+) -> Result<(), NameError> {
+    let mut spans: BTreeMap<&str, Vec<(usize, u64, u64)>> = BTreeMap::new();
+    for draft in drafts {
+        let classified = roles.classify(&draft.channel);
+        let file = files.get(draft.file).filter(|_| classified.role == Role::Map);
+        let Some(((first, last), &input)) = file.and_then(|file| file.span(draft.number)).zip(input_of.get(draft.file))
+        else {
+            continue;
+        };
+        let of_robot = spans.entry(classified.robot).or_default();
+        let overlaps = |(other, from, to): &&(usize, u64, u64)| *other != input && *from <= last && first <= *to;
+        if let Some((other, ..)) = of_robot.iter().find(overlaps)
+            && let [Some(one), Some(other)] = [inputs.get(*other), inputs.get(input)]
+        {
+            let [one, other] = [&one.path, &other.path].map(Clone::clone);
+            return Err(NameError::OneNameForTwo { robot: classified.robot.to_owned(), one, other });
+        }
+        of_robot.push((input, first, last));
     }
     Ok(())
 }

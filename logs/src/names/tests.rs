@@ -119,6 +119,52 @@ fn two_topics_do_not_become_one() {
 }
 
 #[test]
+fn a_log_that_has_another_name_for_its_robot_gets_the_one_that_is_given() {
+    let folder = Folder::new();
+    let mut log = TestLog::new(layouts()[1].clone());
+    let map = OccupancyGrid { header: Header::new(LogTime(1), "robot1/map"), ..Default::default() };
+    let edge = |parent: &str, child: &str| TransformStamped {
+        header: Header::new(LogTime(1), parent),
+        child_frame_id: child.into(),
+        ..Default::default()
+    };
+    let tf = TFMessage { transforms: vec![edge("robot1/map", "robot1/odom"), edge("odom", "base_link")] };
+    log.add("/robot1/map", OccupancyGrid::NAME, 1, &map).add("/tf", TFMessage::NAME, 2, &tf).raw("/x", "p/X", 3, b"");
+    let path = folder.write("a.mcap", &log.finish());
+    let input = Input { robot: Some("a".into()), path };
+    assert_eq!(topics(std::slice::from_ref(&input), &NameRules::default()), [["/a/map", "/tf", "/a/x"]]);
+    let (mut reader, names) = open(&[input], &NameRules::default(), &RobotTopics::default()).unwrap();
+    let mut copy = Vec::new();
+    names.rename_frames(&reader.next_message().unwrap(), &mut copy);
+    assert_eq!(decode::<OccupancyGrid<'_>>(&copy).unwrap().header.frame_id, "a/map");
+    names.rename_frames(&reader.next_message().unwrap(), &mut copy);
+    let expected = TFMessage { transforms: vec![edge("a/map", "a/odom"), edge("a/odom", "a/base_link")] };
+    assert_eq!(decode::<TFMessage>(&copy).unwrap(), expected);
+    assert_eq!(names.note(), None);
+}
+
+#[test]
+fn two_logs_of_one_time_do_not_give_one_robot_two_maps() {
+    let folder = Folder::new();
+    let write = |name: &str, from: u64| {
+        let mut log = TestLog::new(layouts()[1].clone());
+        for time in [from, from + 10] {
+            log.add("/robot1/map", OccupancyGrid::NAME, time, &OccupancyGrid::default());
+        }
+        folder.write(name, &log.finish())
+    };
+    let [first, same_time, later] =
+        [("a.mcap", 0), ("b.mcap", 5), ("c.mcap", 11)].map(|(name, from)| write(name, from));
+    let opened = |paths: &[PathBuf]| open(&inputs(paths), &NameRules::default(), &RobotTopics::default()).map(|_| ());
+    let error = opened(&[first.clone(), same_time.clone()]).unwrap_err().to_string();
+    assert!(error.contains("have maps of `robot1` at the same time") && error.contains("A="), "{error}");
+    opened(&[first.clone(), later]).unwrap();
+    let named =
+        [("a", &first), ("b", &same_time)].map(|(robot, path)| Input { robot: Some(robot.into()), path: path.clone() });
+    assert_eq!(topics(&named, &NameRules::default()), [["/a/map"], ["/b/map"]]);
+}
+
+#[test]
 fn topics_are_renamed_before_and_after_they_are_put_under_their_robot() {
     let folder = Folder::new();
     let path = log(&folder, "a.mcap", &[("/slam/map", OccupancyGrid::NAME), ("/bot/map", OccupancyGrid::NAME)]);

@@ -181,6 +181,17 @@ impl LogFile {
         &self.layout.compressions
     }
 
+    /// The log times of the first and the last message of a channel, or of the file where no index tells them; `None` if there are
+    /// no messages.
+    pub(crate) fn span(&self, channel: u16) -> Option<(u64, u64)> {
+        if let Some(index) = self.index() {
+            let indexed = index.get(&channel).filter(|indexed| indexed.messages > 0)?;
+            return Some([indexed.first, indexed.last].map(|time| time.saturating_add_signed(self.later)).into());
+        }
+        let blocks = &self.layout.blocks;
+        Some((self.first_time()?, blocks.iter().map(|block| block.last_time).max()?))
+    }
+
     /// The least log time in the file; `None` if it has no messages.
     pub fn first_time(&self) -> Option<u64> {
         self.layout.blocks.iter().map(|block| block.first_time).min()
