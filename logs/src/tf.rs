@@ -105,7 +105,7 @@ impl FrameTree {
 }
 
 /// `None` if a value is not finite. A zero quaternion, which many programs write, is read as no rotation.
-fn isometry(transform: &Transform) -> Option<Isometry3<f64>> {
+pub(crate) fn isometry(transform: &Transform) -> Option<Isometry3<f64>> {
     let (t, r) = (transform.translation, transform.rotation);
     let finite = [t.x, t.y, t.z, r.x, r.y, r.z, r.w].iter().all(|value| value.is_finite());
     let quaternion = nalgebra::Quaternion::new(r.w, r.x, r.y, r.z);
@@ -113,7 +113,8 @@ fn isometry(transform: &Transform) -> Option<Isometry3<f64>> {
     finite.then(|| Isometry3::from_parts(Translation3::new(t.x, t.y, t.z), rotation))
 }
 
-fn pose(isometry: &Isometry3<f64>) -> Pose {
+/// An isometry as a pose.
+pub(crate) fn pose(isometry: &Isometry3<f64>) -> Pose {
     let (t, r) = (&isometry.translation, &isometry.rotation);
     Pose { position: Point { x: t.x, y: t.y, z: t.z }, orientation: Quaternion { x: r.i, y: r.j, z: r.k, w: r.w } }
 }

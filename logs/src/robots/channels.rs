@@ -77,6 +77,8 @@ pub(crate) struct RobotChannels {
     posed: BTreeSet<String>,
     /// Robots with maps or tag readings and without a pose topic.
     unposed: BTreeSet<String>,
+    /// Robots with maps and a pose topic.
+    mapped_and_posed: BTreeSet<String>,
     /// Robots with maps, poses or tag readings.
     known: BTreeSet<String>,
     /// Known robots whose detectors publish tag poses in tf only.
@@ -100,6 +102,7 @@ impl RobotChannels {
             updated: BTreeSet::new(),
             posed: BTreeSet::new(),
             unposed: BTreeSet::new(),
+            mapped_and_posed: BTreeSet::new(),
             known: BTreeSet::new(),
             tags_in_tf: BTreeSet::new(),
             has_cameras: false,
@@ -135,6 +138,7 @@ impl RobotChannels {
             }
         }
         roles.known = &asking | &with_poses;
+        roles.mapped_and_posed = &roles.mapped & &with_poses;
         if roles.topics.tf.is_none() {
             roles.unposed = &asking - &with_poses;
         }
@@ -225,12 +229,23 @@ impl RobotChannels {
         self.unposed.iter().map(String::as_str)
     }
 
+    /// Robots with maps and a pose topic, sorted by name.
+    pub(crate) fn mapped_and_posed(&self) -> impl Iterator<Item = &str> {
+        self.mapped_and_posed.iter().map(String::as_str)
+    }
+
+    /// Whether anything is derived from tf.
+    fn needs_tf(&self) -> bool {
+        let with_frames = [&self.unposed, &self.mapped_and_posed, &self.scanned];
+        self.topics.tf.is_some() || self.sees_tags() || with_frames.iter().any(|robots| !robots.is_empty())
+    }
+
     /// Classifies a channel.
     pub(crate) fn classify<'a>(&self, channel: &'a Channel) -> Classified<'a> {
         let topic = channel.topic.as_str();
         let type_name = full_type_name(&channel.schema_name);
         let is_cdr = channel.message_encoding == "cdr";
-        if (self.topics.tf.is_some() || !self.unposed.is_empty() || self.sees_tags() || !self.scanned.is_empty())
+        if self.needs_tf()
             && let Some(robot) = tf_topic(channel)
         {
             return Classified { role: Role::Tf, robot, mismatch: None };

@@ -16,6 +16,7 @@ use std::rc::Rc;
 mod inferred_poses;
 mod map_kinds;
 mod map_updates;
+mod pose_frames;
 mod preview;
 
 const ODOMETRY: &str = Odometry::NAME;

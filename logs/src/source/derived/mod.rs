@@ -59,10 +59,11 @@ impl Derived {
         self.poses.needs_frames() || self.scans.needs_frames() || self.tags.needs_frames()
     }
 
-    /// Learns transforms of the log before they come. Those that are not static show at most how a lidar is mounted; all else in
-    /// them moves.
+    /// Learns transforms of the log before they come. Those that are not static show how a lidar is mounted, and where the frame of
+    /// poses is in that of the map until the first of them comes; all else in them moves.
     pub(super) fn learn_ahead(&mut self, prefix: &str, is_static: bool, transforms: &TFMessage) {
         self.scans.learn_transforms(prefix, is_static, transforms);
+        self.poses.learn_pose_frames(prefix, is_static, transforms);
         if is_static {
             self.poses.learn_transforms(prefix, is_static, transforms);
             self.tags.learn_transforms(prefix, is_static, transforms);
@@ -81,6 +82,7 @@ impl Derived {
         {
             let (prefix, is_static) = (&route.robot, is_static(&route.channel.topic));
             self.poses.learn_transforms(prefix, is_static, &transforms);
+            self.poses.learn_pose_frames(prefix, is_static, &transforms);
             self.tags.learn_transforms(prefix, is_static, &transforms);
             self.scans.learn_transforms(prefix, is_static, &transforms);
         }
@@ -142,6 +144,7 @@ impl Derived {
         };
         let (prefix, is_static) = (&route.robot, is_static(&route.channel.topic));
         self.scans.learn_transforms(prefix, is_static, &message);
+        self.poses.learn_pose_frames(prefix, is_static, &message);
         self.poses.send_of_transforms(prefix, is_static, &message, output)?;
         self.tags.send_of_transforms(prefix, is_static, &message, output)
     }

@@ -2,9 +2,9 @@
 
 use super::super::RobotMessages;
 use super::super::channel::Route;
-use crate::robots::{InferredPoses, NoPose, PoseSource, RobotChannels, Role, pose_with_covariance};
+use crate::robots::{InferredPoses, NoPose, PoseSource, PosesInMap, RobotChannels, Role, pose_with_covariance};
 use crate::tf::TfPoses;
-use gridweave_runtime::ros::{Header, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, TFMessage, decode};
+use gridweave_runtime::ros::{Header, PoseStamped, PoseWithCovarianceStamped, TFMessage, decode};
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
 use std::collections::BTreeSet;
 
@@ -14,6 +14,8 @@ pub(super) struct DerivedPoses {
     tf: Option<TfPoses>,
     /// Poses of robots without a pose topic.
     inferred: InferredPoses,
+    /// Poses on pose topics, in another frame than the map.
+    in_map: PosesInMap,
     /// Whether any pose was derived from transforms or odometry.
     has_inferred: bool,
     /// Robots with scans and without maps, whose odometry is sent.
@@ -24,7 +26,10 @@ pub(super) struct DerivedPoses {
 
 impl DerivedPoses {
     pub(super) fn new(robots: &RobotTopics, roles: &RobotChannels) -> Self {
+        let mut in_map = PosesInMap::default();
+        in_map.set_channels(roles);
         Self {
+            in_map,
             tf: robots.tf.clone().map(TfPoses::new),
             inferred: InferredPoses::new(roles),
             has_inferred: false,
@@ -36,16 +41,17 @@ impl DerivedPoses {
     /// Replaces the roles. Known frames are kept.
     pub(super) fn set_roles(&mut self, roles: &RobotChannels) {
         self.inferred.set_channels(roles);
+        self.in_map.set_channels(roles);
         self.scanned = roles.scanned().map(str::to_owned).collect();
     }
 
     /// Learns the map frame of a robot without a pose topic.
     pub(super) fn learn_map_frame(&mut self, route: &Route, data: &[u8]) {
         if route.role == Role::Map
-            && self.inferred.asks_for_map(&route.robot)
-            && let Ok(map) = decode::<OccupancyGrid<'_>>(data)
+            && (self.inferred.asks_for_map(&route.robot) || self.in_map.asks_for_map(&route.robot))
+            && let Ok(header) = decode::<Header>(data)
         {
-            self.set_map_frame(&route.robot, &map.header.frame_id);
+            self.set_map_frame(&route.robot, &header.frame_id);
         }
     }
 
@@ -54,17 +60,25 @@ impl DerivedPoses {
         if self.inferred.asks_for_map(robot) {
             self.inferred.set_map_frame(robot, frame);
         }
+        if self.in_map.asks_for_map(robot) {
+            self.in_map.set_map_frame(robot, frame);
+        }
     }
 
     /// Whether any pose is derived from transforms.
     pub(super) fn needs_frames(&self) -> bool {
-        self.tf.is_some() || self.inferred.has_robots()
+        self.tf.is_some() || self.inferred.has_robots() || self.in_map.has_robots()
     }
 
     /// Learns frames from transforms without sending anything.
     pub(super) fn learn_transforms(&mut self, prefix: &str, is_static: bool, message: &TFMessage) {
         self.poses_of_transforms(prefix, is_static, message);
         self.inferred.odometry(prefix, is_static, message);
+    }
+
+    /// Learns where the frames of pose topics are in the frames of maps.
+    pub(super) fn learn_pose_frames(&mut self, prefix: &str, is_static: bool, message: &TFMessage) {
+        self.in_map.transforms(prefix, is_static, message);
     }
 
     /// Sends the poses and the odometry derived from transforms.
@@ -110,7 +124,10 @@ impl DerivedPoses {
                 self.has_inferred = true;
                 output.pose.send_bytes(&route.robot, &pose)
             }
-            Ok(pose) => output.pose.send_bytes(&route.robot, &pose),
+            Ok(pose) => {
+                let in_map = self.in_map.in_map(&route.robot, &pose);
+                output.pose.send_bytes(&route.robot, in_map.as_deref().unwrap_or(&pose))
+            }
             Err(NoPose) => {
                 route.unreadable += 1;
                 output.warn(format!("messages on `{}` could not be read as a pose", route.channel.topic));
