@@ -3,9 +3,10 @@
 use super::{MapSelectorParameters, changed_cells, known_cells};
 use crate::shared::geometry::Grid;
 use crate::shared::robot_maps::{RobotMap, RobotMaps};
+use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::OccupancyGrid;
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Outputs of the stage.
 pub(super) struct SelectedMaps {
@@ -18,10 +19,24 @@ impl Outputs for SelectedMaps {
     }
 }
 
+/// The map of a robot with the most known cells.
+#[derive(Clone, Copy)]
+struct LargestMap {
+    known: usize,
+    received: LogTime,
+}
+
+/// A map with less than this share of the known cells of an earlier one is another map: the closing of loops makes maps smaller, and
+/// not by so much.
+const LEAST_SHARE: f64 = 0.5;
+
 /// Selects the maps of robots.
 pub(super) struct MapSelector {
     parameters: MapSelectorParameters,
-    last: RobotMaps<()>,
+    /// Each with the number of its known cells.
+    last: RobotMaps<usize>,
+    /// The robots' largest maps so far.
+    largest: BTreeMap<String, LargestMap>,
     /// Each with the number of its known cells.
     passed_on: RobotMaps<usize>,
     /// The robots whose last map was not passed on.
@@ -30,7 +45,13 @@ pub(super) struct MapSelector {
 
 impl MapSelector {
     pub(super) fn new(parameters: MapSelectorParameters) -> Self {
-        Self { parameters, last: RobotMaps::default(), passed_on: RobotMaps::default(), waiting: BTreeSet::new() }
+        Self {
+            parameters,
+            last: RobotMaps::default(),
+            largest: BTreeMap::new(),
+            passed_on: RobotMaps::default(),
+            waiting: BTreeSet::new(),
+        }
     }
 
     pub(super) fn receive_map(
@@ -39,9 +60,16 @@ impl MapSelector {
         output: &Output<SelectedMaps>,
     ) -> Result<(), StageError> {
         let robot = map.robot();
-        if !self.last.keep(&map, output, |_| ()) {
+        if !self.last.keep(&map, output, |grid| known_cells(grid.cells)) {
             // That the robot exists must be known, to report that it is not merged.
             return output.map.send_bytes(robot, map.message().bytes());
+        }
+        if let Some(RobotMap { own: known, .. }) = self.last.get(robot) {
+            let largest = LargestMap { known: *known, received: map.log_time() };
+            let before = self.largest.entry(robot.to_owned()).or_insert(largest);
+            if before.known <= *known {
+                *before = largest;
+            }
         }
         let before = self.passed_on.get(robot).zip(self.last.get(robot));
         let has_changed = before.is_none_or(|(before, last)| self.has_changed(before, &last.grid()));
@@ -65,6 +93,17 @@ impl MapSelector {
 
     /// The last maps are those of the final merge.
     pub(super) fn finish(&mut self, output: &Output<SelectedMaps>) -> Result<(), StageError> {
+        for (robot, LargestMap { known, received }) in &self.largest {
+            let Some(last) = self.last.get(robot).filter(|last| (last.own as f64) < LEAST_SHARE * *known as f64) else {
+                continue;
+            };
+            output.warn(format!(
+                "the last map of {robot} has {} known cells, and that of {:.0} s before the end had {known}: its SLAM may have started \
+                 again. The last one is merged; --end SECONDS ends the log earlier",
+                last.own,
+                output.log_time().seconds_since(*received)
+            ));
+        }
         let last = self.waiting.iter().filter_map(|robot| Some((robot, self.last.get(robot)?)));
         last.into_iter().try_for_each(|(robot, map)| output.map.send_bytes(robot, map.bytes()))
     }

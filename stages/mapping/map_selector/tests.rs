@@ -89,6 +89,28 @@ fn the_first_map_each_that_has_changed_and_the_last_are_passed_on() {
 }
 
 #[test]
+fn a_last_map_that_is_much_smaller_than_an_earlier_one_is_a_warning() {
+    let warnings = |known: &[usize]| {
+        let mut stage = StageHarness::new(&kind(), "").unwrap();
+        for (number, known) in (1..).zip(known) {
+            let (_, cells) = map(0, 40, *known);
+            let info = MapMetaData { resolution: 0.05, width: 40, height: 10, ..Default::default() };
+            let data: Vec<u8> = cells.iter().map(|value| *value as u8).collect();
+            let map = OccupancyGrid { info, data: &data, ..Default::default() };
+            stage.give::<OccupancyGrid<'_>>("map", "a", LogTime::MIN.plus_seconds(f64::from(number)), &map).unwrap();
+        }
+        stage.finish(LogTime::MIN.plus_seconds(9.0)).unwrap();
+        stage.warnings().keys().cloned().collect::<Vec<_>>()
+    };
+    assert_eq!(warnings(&[10, 20, 18, 11]), [""; 0]);
+    let started_again = warnings(&[10, 20, 2, 9]);
+    assert!(
+        started_again[0].contains("a has 90 known cells, and that of 7 s before the end had 200"),
+        "{started_again:?}"
+    );
+}
+
+#[test]
 fn an_invalid_map_is_passed_on_so_that_its_robot_is_known() {
     let mut stage = StageHarness::new(&kind(), "").unwrap();
     let info = MapMetaData { resolution: 0.05, width: 40, height: 10, ..Default::default() };
