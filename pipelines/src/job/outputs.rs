@@ -65,6 +65,11 @@ fn is_an_input(output: &Path) -> anyhow::Error {
 ///
 /// It does; the error names the option that writes that format.
 pub(crate) fn check_log_ending(log: &Path) -> Result<()> {
+    if log == Path::new("-") {
+        return Err(
+            BadUse("a log cannot be written to standard output: give a file, such as merged.mcap".into()).into()
+        );
+    }
     let ending = log.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
     let instead = match ending.as_str() {
         "png" | "pdf" | "svg" | "jpg" | "jpeg" => format!("give --picture {}, and a log as merged.mcap", log.display()),
@@ -72,6 +77,13 @@ pub(crate) fn check_log_ending(log: &Path) -> Result<()> {
             format!("give --map {}, and a log as merged.mcap", log.with_extension("yaml").display())
         }
         "json" => format!("give --summary {}, and a log as merged.mcap", log.display()),
+        "html" | "htm" => {
+            format!("give a log as merged.mcap, and then `gridweave report merged.mcap -o {}`", log.display())
+        }
+        "zst" | "zstd" | "gz" | "lz4" | "zip" | "tar" | "7z" | "xz" => {
+            "give a log as merged.mcap, whose chunks are compressed already".to_owned()
+        }
+        "txt" | "csv" => format!("give --summary {}, and a log as merged.mcap", log.with_extension("json").display()),
         "db3" => format!("give {}: rosbag2 and Foxglove read MCAP", log.with_extension("mcap").display()),
         _ => return Ok(()),
     };

@@ -19,16 +19,22 @@ impl Outputs for SelectedMaps {
     }
 }
 
-/// The map of a robot with the most known cells.
+/// The map of a robot with the largest known area.
 #[derive(Clone, Copy)]
 struct LargestMap {
-    known: usize,
+    /// Square metres.
+    area: f64,
     received: LogTime,
 }
 
-/// A map with less than this share of the known cells of an earlier one is another map: the closing of loops makes maps smaller, and
+/// A map with less than this share of the known area of an earlier one is another map: the closing of loops makes maps smaller, and
 /// not by so much.
 const LEAST_SHARE: f64 = 0.5;
+
+/// The known area of a map, square metres.
+fn known_area(map: &RobotMap<usize>) -> f64 {
+    map.own as f64 * map.grid().geometry.resolution.powi(2)
+}
 
 /// Selects the maps of robots.
 pub(super) struct MapSelector {
@@ -64,10 +70,10 @@ impl MapSelector {
             // That the robot exists must be known, to report that it is not merged.
             return output.map.send_bytes(robot, map.message().bytes());
         }
-        if let Some(RobotMap { own: known, .. }) = self.last.get(robot) {
-            let largest = LargestMap { known: *known, received: map.log_time() };
+        if let Some(last) = self.last.get(robot) {
+            let largest = LargestMap { area: known_area(last), received: map.log_time() };
             let before = self.largest.entry(robot.to_owned()).or_insert(largest);
-            if before.known <= *known {
+            if before.area <= largest.area {
                 *before = largest;
             }
         }
@@ -93,14 +99,12 @@ impl MapSelector {
 
     /// The last maps are those of the final merge.
     pub(super) fn finish(&mut self, output: &Output<SelectedMaps>) -> Result<(), StageError> {
-        for (robot, LargestMap { known, received }) in &self.largest {
-            let Some(last) = self.last.get(robot).filter(|last| (last.own as f64) < LEAST_SHARE * *known as f64) else {
-                continue;
-            };
+        for (robot, LargestMap { area, received }) in &self.largest {
+            let last = self.last.get(robot).map(known_area);
+            let Some(last) = last.filter(|last| *last < LEAST_SHARE * area) else { continue };
             output.warn(format!(
-                "the last map of {robot} has {} known cells, and that of {:.0} s before the end had {known}: its SLAM may have started \
-                 again. The last one is merged; --end SECONDS ends the log earlier",
-                last.own,
+                "the last map of {robot} shows {last:.1} square metres, and that of {:.0} s before the end showed {area:.1}: its SLAM \
+                 may have started again. The last one is merged; --end SECONDS ends the log earlier",
                 output.log_time().seconds_since(*received)
             ));
         }

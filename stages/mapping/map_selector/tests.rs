@@ -105,7 +105,7 @@ fn a_last_map_that_is_much_smaller_than_an_earlier_one_is_a_warning() {
     assert_eq!(warnings(&[10, 20, 18, 11]), [""; 0]);
     let started_again = warnings(&[10, 20, 2, 9]);
     assert!(
-        started_again[0].contains("a has 90 known cells, and that of 7 s before the end had 200"),
+        started_again[0].contains("a shows 0.2 square metres, and that of 7 s before the end showed 0.5"),
         "{started_again:?}"
     );
 }

@@ -10,7 +10,9 @@ use crate::shared::robot_pair::RobotPair;
 use gridweave_runtime::ros::{
     Alignment, GridError, Header, OccupancyGrid, RobotFrames, TFMessage, TagEstimates, UnmergedRobot, Verdict, Verdicts,
 };
-use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
+use gridweave_runtime::stage::{
+    Context, InitialPoses, Out, Output, OutputPorts, Outputs, Received, StageError, StageKind,
+};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The kind `frame_solver`.
@@ -78,6 +80,7 @@ struct FrameSolver {
     parameters: FrameSolverParameters,
     /// The reference that the pipeline names.
     wanted: Option<String>,
+    initial_poses: InitialPoses,
     /// All known robots, and the names of their map frames in the merged tree of frames.
     robots: BTreeSet<String>,
     /// The robots that have sent a map that can be used.
@@ -102,6 +105,7 @@ impl FrameSolver {
         Self {
             parameters,
             wanted: context.reference.clone(),
+            initial_poses: context.initial_poses.clone(),
             robots: BTreeSet::new(),
             mapped: BTreeSet::new(),
             unusable_maps: BTreeMap::new(),
@@ -202,8 +206,25 @@ impl FrameSolver {
         self.send_all(output)
     }
 
-    /// Where a map cannot be used, that is why its robot is not merged.
+    /// Where a map cannot be used, that is why its robot is not merged; where others have maps and one has none, it has only tags.
     fn explain_maps(&mut self) {
+        let is_aligned = |robot: &String| {
+            self.alignments
+                .values()
+                .any(|alignment| alignment.accepted && [&alignment.a, &alignment.b].contains(&robot))
+        };
+        let is_without_map = |robot: &String| {
+            !is_aligned(robot)
+                && !self.mapped.is_empty()
+                && !self.mapped.contains(robot)
+                && !self.unusable_maps.contains_key(robot)
+                && !self.lost.contains_key(robot)
+        };
+        for (robot, reason) in &mut self.solution.unmerged {
+            if is_without_map(robot) {
+                *reason = format!("it has sent no map, and by its tags alone: {reason}");
+            }
+        }
         for (robot, error) in &self.unusable_maps {
             if let Some(reason) = self.solution.unmerged.get_mut(robot) {
                 *reason = format!("its map cannot be used: {error}");
@@ -222,6 +243,13 @@ impl FrameSolver {
             };
             return Err(StageError::new(format!("place the maps in the frame of the reference `{wanted}`"), cause)
                 .with_help("set `reference` in [pipeline] to one of the robots, or check the topics in [robots]"));
+        }
+        for robot in self.initial_poses.keys().filter(|robot| !self.robots.contains(*robot)) {
+            let robots: Vec<&str> = self.robots.iter().map(String::as_str).collect();
+            output.warn(format!(
+                "the initial pose of `{robot}` is not used, as there is no such robot; the robots seen are {}",
+                robots.join(", ")
+            ));
         }
         self.send(output, true)?;
         self.send_verdicts(output)

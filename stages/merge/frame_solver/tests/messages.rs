@@ -66,6 +66,33 @@ fn a_reference_that_never_shows_up_is_an_error_that_names_the_robots() {
 }
 
 #[test]
+fn a_robot_without_a_map_beside_those_with_maps_is_said_to_have_none() {
+    let mut run = Run::new(None);
+    run.map("robot1", "map");
+    run.align(&refused("robot1", "robot2", 0.1, "no tag in common"));
+    assert!(
+        run.reason("robot2").starts_with("it has sent no map, and by its tags alone: "),
+        "{}",
+        run.reason("robot2")
+    );
+    run.map("robot2", "map");
+    assert!(!run.reason("robot2").contains("no map"), "{}", run.reason("robot2"));
+}
+
+#[test]
+fn an_initial_pose_of_a_robot_that_never_shows_up_is_a_warning() {
+    let initial_poses = ["robot1", "robt2"].map(|robot| (robot.to_owned(), InitialPose::ORIGIN)).into();
+    let mut run = Run::in_context(&Context { initial_poses, ..Default::default() });
+    run.map("robot1", "map");
+    run.map("robot2", "map");
+    run.finish().unwrap();
+    let warnings: Vec<String> = run.stage.warnings().into_keys().collect();
+    let warning =
+        "the initial pose of `robt2` is not used, as there is no such robot; the robots seen are robot1, robot2";
+    assert_eq!(warnings, [warning]);
+}
+
+#[test]
 fn a_log_without_robots_has_no_frames() {
     let mut run = Run::new(None);
     run.finish().unwrap();

@@ -11,7 +11,7 @@ use gridweave_runtime::ros::{
     Alignment, Header, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames, TFMessage, TagEstimates, UnmergedRobot,
     Verdict, Verdicts,
 };
-use gridweave_runtime::stage::{Context, StageError, StageHarness};
+use gridweave_runtime::stage::{Context, InitialPose, StageError, StageHarness};
 
 struct Run {
     stage: StageHarness,
@@ -22,8 +22,11 @@ struct Run {
 
 impl Run {
     fn new(reference: Option<&str>) -> Self {
-        let context = Context { reference: reference.map(str::to_owned), ..Default::default() };
-        let stage = StageHarness::with_context(&kind(), "", &context).unwrap();
+        Self::in_context(&Context { reference: reference.map(str::to_owned), ..Default::default() })
+    }
+
+    fn in_context(context: &Context) -> Self {
+        let stage = StageHarness::with_context(&kind(), "", context).unwrap();
         Self { stage, latest: None, verdicts: None }
     }
 
