@@ -11,7 +11,7 @@
 
 use gridweave_runtime::engine::{EngineKind, run};
 use gridweave_runtime::message::LogTime;
-use gridweave_runtime::pipeline::{Mode, Overflow, Pipeline, Restart, StageSpec, Wire};
+use gridweave_runtime::pipeline::{DEFAULT_SAME_TIME_LIMIT, Mode, Overflow, Pipeline, Restart, StageSpec, Wire};
 use gridweave_runtime::ros::{GridPrefix, MapMetaData, OccupancyGrid};
 use gridweave_runtime::stage::{
     Context, Out, Output, OutputPorts, Outputs, Parameters, Received, Source, StageError, StageKind,
@@ -138,6 +138,7 @@ fn pipeline_hop(size: usize, engine: EngineKind) -> f64 {
         batch: false,
         stall_timeout: None,
         memory_limit: None,
+        same_time_limit: DEFAULT_SAME_TIME_LIMIT,
         robots: Default::default(),
         initial_poses: Default::default(),
         stages,

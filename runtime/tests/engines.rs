@@ -82,6 +82,26 @@ fn a_diamond_over_two_ports_of_a_source_does_not_hang_at_equal_times() {
 }
 
 #[test]
+fn messages_of_one_log_time_that_must_wait_take_limited_memory() {
+    let mut builder = PipelineBuilder::new(registry());
+    builder.stage("source", "counter", "count = 200000\nsize = 0\nstep = 0\nboth = true", &[]);
+    builder.stage("nothing", "filter", "keep_every = 0", &["source.b"]);
+    builder.stage("sink", "recorder", "", &["nothing.out", "source.a"]);
+    for depth in [1, 16] {
+        let mut pipeline = builder.build(depth);
+        pipeline.same_time_limit = 4_000_000;
+        for engine in ENGINES {
+            let error = run_watched(&pipeline, engine).unwrap_err();
+            assert_eq!(error.stage.as_deref(), Some("sink"), "{engine}: {error}");
+            let Failure::SameTime { input, messages, bytes, .. } = &error.failure else { panic!("{engine}: {error}") };
+            assert_eq!(input, "source.a");
+            assert!(*messages > 4_000 && *bytes < 12_000_000, "{engine}, depth {depth}: {error}");
+            assert!(error.to_string().contains("same_time_limit"), "{error}");
+        }
+    }
+}
+
+#[test]
 fn a_source_that_is_silent_on_one_port_holds_nobody_up() {
     let mut builder = PipelineBuilder::new(registry());
     builder.stage("source", "counter", "count = 3000", &[]);

@@ -12,7 +12,7 @@
 
 use gridweave_runtime::engine::{EngineKind, run};
 use gridweave_runtime::message::LogTime;
-use gridweave_runtime::pipeline::{Mode, Overflow, Pipeline, Restart, StageSpec, Wire};
+use gridweave_runtime::pipeline::{DEFAULT_SAME_TIME_LIMIT, Mode, Overflow, Pipeline, Restart, StageSpec, Wire};
 use gridweave_runtime::ros::{MapMetaData, OccupancyGrid, encode};
 use gridweave_runtime::stage::{
     Context, Out, Output, OutputPorts, Outputs, Received, Source, StageError, StageHarness, StageKind,
@@ -159,6 +159,7 @@ fn through((kind, parameters): &Stage, bytes: &[u8], one_by_one: bool, count: u6
         batch: !one_by_one,
         stall_timeout: None,
         memory_limit: None,
+        same_time_limit: DEFAULT_SAME_TIME_LIMIT,
         robots: Default::default(),
         initial_poses: Default::default(),
         stages,

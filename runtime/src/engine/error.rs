@@ -111,6 +111,28 @@ pub enum Failure {
         /// The memory limit, bytes.
         limit: u64,
     },
+    /// The pending messages of one log time take more memory than the pipeline allows.
+    #[error(
+        "has received {messages} messages of `{input}` with the same log time, {}.{:09} s, and can handle none of them before \
+         later ones come, as other inputs may bring some of that time; they take {} MB of memory, and `same_time_limit` in \
+         [pipeline] allows {} MB: give the messages of the log their own times, leave their topic out, or raise the limit",
+        log_time / 1_000_000_000,
+        log_time % 1_000_000_000,
+        bytes / 1_000_000,
+        limit / 1_000_000
+    )]
+    SameTime {
+        /// The output that they come from: STAGE.PORT.
+        input: String,
+        /// The number of pending messages.
+        messages: usize,
+        /// Their log time, nanoseconds.
+        log_time: u64,
+        /// The memory that they take, bytes.
+        bytes: u64,
+        /// The limit, bytes.
+        limit: u64,
+    },
     /// The process that started it is gone.
     #[error("lost its supervisor")]
     Orphaned,

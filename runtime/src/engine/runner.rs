@@ -20,6 +20,8 @@ pub(super) struct Runner {
     /// The output that each wire comes from: STAGE.PORT.
     origins: Vec<String>,
     report: StageReport,
+    /// The maximum memory of an input's pending messages of one log time, bytes.
+    same_time_limit: u64,
 }
 
 impl Runner {
@@ -46,6 +48,7 @@ impl Runner {
             ports: spec.inputs.iter().map(|wire| wire.port).collect(),
             origins: spec.inputs.iter().map(origin).collect(),
             report,
+            same_time_limit: pipeline.same_time_limit,
         })
     }
 
@@ -91,6 +94,22 @@ impl Runner {
         let Some(wire) = next_input(queues) else { return Ok(None) };
         let Some(message) = queues[wire].pop() else { return Ok(None) };
         self.take(wire, message).map(|()| Some(wire))
+    }
+
+    /// Checks the memory of messages that cannot be taken yet, although all have one log time: no watermark lies between
+    /// them, so the credit of links does not limit how many there are.
+    pub(super) fn check_pending(&self, queues: &[InputQueue]) -> Result<(), Failure> {
+        let exceeds = |queue: &&InputQueue| queue.bytes() as u64 > self.same_time_limit && queue.has_single_log_time();
+        let Some((queue, input)) = queues.iter().zip(&self.origins).find(|(queue, _)| exceeds(queue)) else {
+            return Ok(());
+        };
+        Err(Failure::SameTime {
+            input: input.clone(),
+            messages: queue.len(),
+            log_time: queue.bound().0,
+            bytes: queue.bytes() as u64,
+            limit: self.same_time_limit,
+        })
     }
 
     /// Passes a message of the given wire to the stage.

@@ -115,6 +115,7 @@ impl SingleStage {
             queue.append(&mut inbox.borrow_mut());
         }
         while self.runner.handle_next(&mut self.queues)?.is_some() {}
+        self.runner.check_pending(&self.queues)?;
         match lower_bound(&self.queues) {
             Some(watermark) => self.links.iter().for_each(|link| link.raise(watermark)),
             None => {

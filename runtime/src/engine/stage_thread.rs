@@ -232,6 +232,7 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
                 return Ok(self.outputs.borrow_mut().end(time)?);
             }
             self.flush()?;
+            self.runner.check_pending(&self.queues)?;
             for (receiver, queue) in self.receivers.iter_mut().zip(&self.queues) {
                 receiver.extend_credit(queue);
             }

@@ -1,12 +1,14 @@
 //! The pending messages of one wire.
 
-use crate::message::{LogTime, Message, MessageFlags};
+use crate::message::{LogTime, Message, MessageFlags, MessageHeader};
 use std::collections::VecDeque;
 
 /// The pending messages of one wire, and a lower bound for the log times of those that follow.
 #[derive(Debug, Default)]
 pub struct InputQueue {
     messages: VecDeque<Message>,
+    /// The memory of the pending messages, bytes.
+    bytes: usize,
     bound: LogTime,
     ended: bool,
     sent_at: u64,
@@ -21,6 +23,7 @@ impl InputQueue {
         if flags.contains(MessageFlags::END) {
             self.ended = true;
         } else if !flags.contains(MessageFlags::WATERMARK) {
+            self.bytes += memory_of(&message);
             self.messages.push_back(message);
         }
     }
@@ -55,6 +58,7 @@ impl InputQueue {
     /// Moves everything from `other` to the end of this queue.
     pub fn append(&mut self, other: &mut InputQueue) {
         self.messages.append(&mut other.messages);
+        self.bytes += std::mem::take(&mut other.bytes);
         self.bound = self.bound.max(other.bound);
         self.ended |= other.ended;
     }
@@ -66,12 +70,19 @@ impl InputQueue {
 
     /// Removes the next message.
     pub fn pop(&mut self) -> Option<Message> {
-        self.messages.pop_front()
+        let message = self.messages.pop_front()?;
+        self.bytes -= memory_of(&message);
+        Some(message)
     }
 
     /// The number of pending messages.
     pub fn len(&self) -> usize {
         self.messages.len()
+    }
+
+    /// The memory of the pending messages, bytes: of an empty message, too.
+    pub(crate) fn bytes(&self) -> usize {
+        self.bytes
     }
 
     /// Whether no message is pending.
@@ -102,5 +113,35 @@ impl InputQueue {
     pub fn has_single_log_time(&self) -> bool {
         let time = |message: &Message| message.header().log_time;
         self.messages.front().map(time) == self.messages.back().map(time)
+    }
+}
+
+/// The memory that a message takes: here, and in its sample.
+fn memory_of(message: &Message) -> usize {
+    size_of::<Message>() + MessageHeader::SIZE + message.bytes().len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(flags: MessageFlags, length: usize) -> Message {
+        Message::from_vec(MessageHeader { flags, ..Default::default() }, vec![0; length])
+    }
+
+    #[test]
+    fn an_empty_message_counts_and_a_message_that_was_taken_does_not() {
+        let mut queue = InputQueue::default();
+        for length in [0, 1000] {
+            queue.push(message(MessageFlags::DATA, length));
+        }
+        queue.push(message(MessageFlags::WATERMARK, 0));
+        let bookkeeping = queue.bytes() - 1000;
+        assert!(bookkeeping >= 2 * (size_of::<Message>() + MessageHeader::SIZE), "{bookkeeping}");
+        let mut other = InputQueue::default();
+        other.append(&mut queue);
+        assert_eq!((queue.bytes(), other.bytes()), (0, bookkeeping + 1000));
+        while other.pop().is_some() {}
+        assert_eq!(other.bytes(), 0);
     }
 }

@@ -148,7 +148,17 @@ fn assemble(settings: Settings, drafts: Vec<Draft<'_>>, wiring: &Wiring, order: 
     }
     stages.sort_by_key(|(index, _)| *index);
     let stages = stages.into_iter().map(|(_, spec)| spec).collect();
-    let Settings { name, mode, reference, seed, batch, stall_timeout, memory_limit, robots, initial_poses, .. } =
-        settings;
-    Pipeline { name, mode, reference, seed, batch, stall_timeout, memory_limit, robots, initial_poses, stages }
+    Pipeline {
+        name: settings.name,
+        mode: settings.mode,
+        reference: settings.reference,
+        seed: settings.seed,
+        batch: settings.batch,
+        stall_timeout: settings.stall_timeout,
+        memory_limit: settings.memory_limit,
+        same_time_limit: settings.same_time_limit,
+        robots: settings.robots,
+        initial_poses: settings.initial_poses,
+        stages,
+    }
 }

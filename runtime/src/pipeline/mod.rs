@@ -11,6 +11,7 @@
 //! batch = true                    # send small messages in batches; false sends each at once
 //! stall_timeout = 60.0            # the maximum time of a stage for one message, seconds; 0: unlimited
 //! memory_limit = 2_000_000_000    # the maximum memory of a process, bytes; 0: unlimited
+//! same_time_limit = 2_000_000_000 # the maximum memory of an input's messages that all have one log time, bytes
 //!
 //! [robots]                        # the topics of the robots; `{robot}` matches one part of a path
 //! map = "/{robot}/map"
@@ -88,7 +89,7 @@ pub use live::{Mode, Overflow, Restart};
 pub use nearest::{quoted_list, suggest};
 pub use overrides::{Overrides, SettingError};
 pub use parameter_schema::{ParameterInfo, parameters_of};
-pub use settings::{DEFAULT_DEPTH, MAX_DEPTH};
+pub use settings::{DEFAULT_DEPTH, DEFAULT_SAME_TIME_LIMIT, MAX_DEPTH};
 pub use single_stage::SingleStage;
 pub use text_layout::{TEXT_WIDTH, wrap_words};
 
@@ -114,6 +115,9 @@ pub struct Pipeline {
     pub stall_timeout: Option<Duration>,
     /// The maximum private memory of each process on the engine `processes`, bytes; none if unlimited.
     pub memory_limit: Option<u64>,
+    /// The maximum memory of an input's pending messages that all have the same log time, bytes. Where an earlier input may
+    /// still bring a message of that time, all of them wait, however small the depth.
+    pub same_time_limit: u64,
     /// The topic patterns of the robots.
     pub robots: RobotTopics,
     /// The poses of robots' maps that the user knows; if there are any, that of the reference is among them.

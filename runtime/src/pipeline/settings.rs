@@ -20,6 +20,10 @@ pub const MAX_DEPTH: usize = 4096;
 /// The default for the maximum time of a stage for one message.
 const DEFAULT_STALL_TIMEOUT: Duration = Duration::from_secs(300);
 
+/// The default for the maximum memory of an input's pending messages of one log time, bytes: more than the content that a log
+/// may have at one time.
+pub const DEFAULT_SAME_TIME_LIMIT: u64 = 2 << 30;
+
 /// The settings of `[pipeline]` and `[robots]`.
 #[derive(Debug)]
 pub(super) struct Settings {
@@ -31,6 +35,7 @@ pub(super) struct Settings {
     pub(super) batch: bool,
     pub(super) stall_timeout: Option<Duration>,
     pub(super) memory_limit: Option<u64>,
+    pub(super) same_time_limit: u64,
     pub(super) robots: RobotTopics,
     pub(super) initial_poses: InitialPoses,
 }
@@ -49,6 +54,7 @@ impl Settings {
             batch: true,
             stall_timeout,
             memory_limit: None,
+            same_time_limit: DEFAULT_SAME_TIME_LIMIT,
             robots,
             initial_poses: InitialPoses::new(),
         }
@@ -56,8 +62,8 @@ impl Settings {
 
     /// Reads the section `[pipeline]`.
     pub(super) fn read_pipeline(&mut self, section: &Item, problems: &mut Problems) {
-        const KEYS: [&str; 8] =
-            ["name", "mode", "reference", "seed", "depth", "batch", "stall_timeout", "memory_limit"];
+        const KEYS: [&str; 9] =
+            ["name", "mode", "reference", "seed", "depth", "batch", "stall_timeout", "memory_limit", "same_time_limit"];
         for Entry { key, key_at, item } in entries(section, "[pipeline]", problems) {
             match key.as_str() {
                 "name" => match text(key, item, problems) {
@@ -85,8 +91,12 @@ impl Settings {
                     Some(seconds) => self.stall_timeout = Some(seconds).filter(|seconds| !seconds.is_zero()),
                     None => problems.push(wrong_type(key, item, "seconds, 0 or more")),
                 },
-                "memory_limit" => match item.as_integer().and_then(|bytes| u64::try_from(bytes).ok()) {
+                "memory_limit" => match read_bytes(item) {
                     Some(bytes) => self.memory_limit = Some(bytes).filter(|bytes| *bytes > 0),
+                    None => problems.push(wrong_type(key, item, "bytes, 0 or more")),
+                },
+                "same_time_limit" => match read_bytes(item) {
+                    Some(bytes) => self.same_time_limit = bytes,
                     None => problems.push(wrong_type(key, item, "bytes, 0 or more")),
                 },
                 _ => problems.push(unknown_key(key, key_at, "[pipeline]", &KEYS)),
@@ -153,6 +163,10 @@ impl Settings {
 fn read_seconds(item: &Item) -> Option<Duration> {
     let seconds = item.as_float().or_else(|| item.as_integer().map(|seconds| seconds as f64))?;
     Duration::try_from_secs_f64(seconds).ok()
+}
+
+fn read_bytes(item: &Item) -> Option<u64> {
+    u64::try_from(item.as_integer()?).ok()
 }
 
 /// Reads a seed. TOML has no integers above 2^63, so a larger seed is a string.

@@ -1,7 +1,7 @@
 //! Serialization of a pipeline as a file that does not depend on defaults, overrides or the order of inputs.
 
 use super::live::Keyword;
-use super::{Mode, Pipeline};
+use super::{DEFAULT_SAME_TIME_LIMIT, Mode, Pipeline};
 use crate::stage::{InitialPose, InitialPoses, RobotTopics, TagFields};
 use toml::{Table, Value};
 
@@ -19,6 +19,11 @@ impl Pipeline {
         ]);
         if let Some(limit) = self.memory_limit {
             pipeline.insert("memory_limit".into(), Value::Integer(i64::try_from(limit).unwrap_or(i64::MAX)));
+        }
+        // It changes no results, so outputs do not mention the default.
+        if self.same_time_limit != DEFAULT_SAME_TIME_LIMIT {
+            let limit = i64::try_from(self.same_time_limit).unwrap_or(i64::MAX);
+            pipeline.insert("same_time_limit".into(), limit.into());
         }
         if let Some(reference) = &self.reference {
             pipeline.insert("reference".into(), reference.as_str().into());

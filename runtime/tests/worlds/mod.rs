@@ -2,7 +2,7 @@
 #![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used, clippy::panic)]
 
 use gridweave_runtime::message::{LogTime, Message, MessageHeader};
-use gridweave_runtime::pipeline::{Mode, Overflow, Pipeline, Restart, StageSpec, Wire};
+use gridweave_runtime::pipeline::{DEFAULT_SAME_TIME_LIMIT, Mode, Overflow, Pipeline, Restart, StageSpec, Wire};
 use gridweave_runtime::ros::{GridPrefix, MapMetaData, OccupancyGrid};
 use gridweave_runtime::stage::{
     AnyMessage, Context, InputPort, Out, Output, OutputPorts, Outputs, Parameters, PortType, Received, Registry,
@@ -330,6 +330,7 @@ impl PipelineBuilder {
             batch: depth > 2,
             stall_timeout: None,
             memory_limit: None,
+            same_time_limit: DEFAULT_SAME_TIME_LIMIT,
             robots: Default::default(),
             initial_poses: Default::default(),
             stages,

@@ -8,7 +8,9 @@ use crate::temporary;
 use anyhow::{Context, Result, bail};
 use gridweave_logs::reader::LogFile;
 use gridweave_runtime::engine::{self, EngineKind, Observer};
-use gridweave_runtime::pipeline::{DEFAULT_DEPTH, Mode, Overflow, Pipeline, Restart, StageSpec, Wire};
+use gridweave_runtime::pipeline::{
+    DEFAULT_DEPTH, DEFAULT_SAME_TIME_LIMIT, Mode, Overflow, Pipeline, Restart, StageSpec, Wire,
+};
 use gridweave_runtime::stage::StageKind;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -96,6 +98,7 @@ fn run_stage(case: &Case, files: &[(&str, String)], observer: &dyn Observer) -> 
         batch: case.stage.batch,
         stall_timeout: None,
         memory_limit: None,
+        same_time_limit: DEFAULT_SAME_TIME_LIMIT,
         robots: case.stage.robots.clone(),
         initial_poses: case.stage.initial_poses.clone(),
         stages,

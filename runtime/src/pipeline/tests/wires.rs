@@ -76,6 +76,17 @@ fn limits_of_processes_may_be_switched_off() {
 }
 
 #[test]
+fn the_memory_of_messages_of_one_time_is_limited_unless_told_otherwise() {
+    let limit = |text: &str| parse(&changed("seed = 7", text)).unwrap().same_time_limit;
+    assert_eq!(limit("seed = 7"), 2 << 30);
+    assert_eq!(limit("same_time_limit = 1000"), 1000);
+    for text in ["seed = 7", "same_time_limit = 1000"] {
+        let pipeline = parse(&changed("seed = 7", text)).unwrap();
+        assert_eq!(parse(&pipeline.to_toml()).unwrap().same_time_limit, limit(text));
+    }
+}
+
+#[test]
 fn depths_come_from_the_stage_then_from_the_pipeline() {
     let pipeline = parse(&changed("seed = 7", "depth = 32")).unwrap();
     let depths: Vec<(&str, usize)> = pipeline.stages.iter().map(|stage| (stage.name.as_str(), stage.depth)).collect();
