@@ -1,7 +1,7 @@
 //! Reduces a map to its walls and the space between them.
 
 use super::MapCleanerParameters;
-use super::objects::loose_cells;
+use super::objects::each_loose_segment;
 use super::passages::wide_known_space;
 use crate::shared::geometry::{CellBox, Grid, UNKNOWN, is_known, is_occupied};
 
@@ -24,9 +24,12 @@ pub fn clean(grid: &Grid<'_>, parameters: &MapCleanerParameters, cells: &mut [i8
             }
         }
     }
-    for cell in loose_cells(grid, parameters) {
-        if let Some(value) = cells.get_mut(grid.geometry.index(cell)) {
-            *value = UNKNOWN;
+    each_loose_segment(grid, parameters, |row, columns| {
+        let start = row * grid.geometry.width;
+        for place in columns.map(|column| start + column) {
+            if is_occupied(grid.cells[place]) {
+                cells[place] = UNKNOWN;
+            }
         }
-    }
+    });
 }
