@@ -21,6 +21,12 @@ pub fn is_static(topic: &str) -> bool {
     topic.ends_with("tf_static")
 }
 
+/// The maximum number of transforms between two frames, as in tf2. More are no robot, and each message would follow all of them.
+const LONGEST_PATH: usize = 1000;
+
+/// The maximum length of a name in ROS 2, bytes: that of a topic of DDS. A robot with a longer name is none.
+pub(crate) const LONGEST_ROS_NAME: usize = 255;
+
 /// The latest transform of each frame to its parent.
 #[derive(Clone, Debug, Default)]
 pub struct FrameTree {
@@ -66,16 +72,21 @@ impl FrameTree {
         true
     }
 
-    /// The pose of the frame `source` in the frame `target`; `None` if they are not connected.
+    /// The pose of the frame `source` in the frame `target`; `None` if they are not connected, or by more than 1000 transforms.
     pub fn lookup(&self, target: &str, source: &str) -> Option<Isometry3<f64>> {
         self.chain(target, source).map(|chain| chain.transform_target_source)
     }
 
     fn chain<'a>(&'a self, target: &'a str, source: &'a str) -> Option<Chain<'a>> {
         let to_root: Vec<_> = self.ancestors(source).collect();
+        // In a cycle a frame comes again; what counts is the first time.
+        let mut places = BTreeMap::new();
+        for (place, (frame, _)) in to_root.iter().enumerate() {
+            places.entry(*frame).or_insert(place);
+        }
         // The two paths meet at the first ancestor of the target that is also one of the source's.
         for (steps, (frame, transform_ancestor_target)) in self.ancestors(target).enumerate() {
-            let Some(meeting) = to_root.iter().position(|(other, _)| *other == frame) else { continue };
+            let Some(&meeting) = places.get(frame) else { continue };
             let mut to_target: Vec<&str> = self.ancestors(target).take(steps).map(|(frame, _)| frame).collect();
             to_target.reverse();
             let from_source = to_root[..meeting].iter().map(|(frame, _)| *frame);
@@ -93,14 +104,14 @@ impl FrameTree {
         chain.children.iter().find(moves).or(chain.children.first()).copied()
     }
 
-    /// `frame` and its ancestors, each with the pose of `frame` in it.
+    /// `frame` and its ancestors, each with the pose of `frame` in it, up to the maximum that is followed.
     fn ancestors<'a>(&'a self, frame: &'a str) -> impl Iterator<Item = (&'a str, Isometry3<f64>)> {
         let step = |(child, transform): &(&'a str, Isometry3<f64>)| {
             let edge = self.edges.get(*child)?;
             Some((edge.parent.as_str(), edge.transform_parent_child * transform))
         };
         // A path with more steps than there are edges is a cycle.
-        std::iter::successors(Some((frame, Isometry3::identity())), step).take(self.edges.len() + 1)
+        std::iter::successors(Some((frame, Isometry3::identity())), step).take(self.edges.len().min(LONGEST_PATH) + 1)
     }
 }
 
@@ -186,6 +197,7 @@ impl TfPoses {
         let Some(frames) = &self.frames else { return };
         for pattern in [&frames.map_frame, &frames.base_frame] {
             if let Some(robot) = match_robot(pattern, frame)
+                && robot.len() <= LONGEST_ROS_NAME
                 && !self.robots.contains_key(robot)
             {
                 let named = |pattern: &str| pattern.replace("{robot}", robot);

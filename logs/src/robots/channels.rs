@@ -3,8 +3,8 @@
 use super::scans::is_scan;
 use super::tag_reader::{TagReader, has_poses_in_tf, known_fields};
 use crate::schemas::full_type_name;
-use crate::tf::tf_topic;
-use gridweave_runtime::message::Channel;
+use crate::tf::{LONGEST_ROS_NAME, tf_topic};
+use gridweave_runtime::message::{Channel, shortened};
 use gridweave_runtime::ros::{
     OccupancyGrid, OccupancyGridUpdate, Odometry, PoseStamped, PoseWithCovarianceStamped, RosMessage, TagRange,
     TopologicalMap,
@@ -191,7 +191,7 @@ impl RobotChannels {
     /// The robot of a channel with scans, whether or not the robot has a map.
     pub(crate) fn scanning_robot<'a>(&self, channel: &'a Channel) -> Option<&'a str> {
         let holds_scans = channel.message_encoding == "cdr" && is_scan(&full_type_name(&channel.schema_name));
-        match_robot(&self.topics.scan, &channel.topic).filter(|_| holds_scans)
+        match_robot(&self.topics.scan, &channel.topic).filter(|robot| holds_scans && fits(robot))
     }
 
     /// Robots with maps, sorted by name.
@@ -240,8 +240,21 @@ impl RobotChannels {
         self.topics.tf.is_some() || self.sees_tags() || with_frames.iter().any(|robots| !robots.is_empty())
     }
 
-    /// Classifies a channel.
+    /// Classifies a channel. What cannot be a name of ROS names no robot: the others go on without it.
     pub(crate) fn classify<'a>(&self, channel: &'a Channel) -> Classified<'a> {
+        let classified = self.classify_by_type(channel);
+        if classified.role == Role::Other || fits(classified.robot) {
+            return classified;
+        }
+        let (topic, length) = (shortened(&channel.topic), classified.robot.len());
+        let mismatch = format!(
+            "`{topic}` is not read as a robot's: the robot's name has {length} bytes, and names of ROS have at most \
+             {LONGEST_ROS_NAME}; rename the topic"
+        );
+        Classified { role: Role::Other, robot: "", mismatch: Some(mismatch) }
+    }
+
+    fn classify_by_type<'a>(&self, channel: &'a Channel) -> Classified<'a> {
         let topic = channel.topic.as_str();
         let type_name = full_type_name(&channel.schema_name);
         let is_cdr = channel.message_encoding == "cdr";
@@ -306,6 +319,11 @@ impl RobotChannels {
         }
         other
     }
+}
+
+/// Whether the name of a robot may come from ROS.
+fn fits(robot: &str) -> bool {
+    robot.len() <= LONGEST_ROS_NAME
 }
 
 fn role_of_map(type_name: &str) -> Option<Role> {

@@ -8,7 +8,7 @@ use crate::names::rename_advice;
 use crate::robots::{CellValues, MapOrigin, MergedMaps, RobotChannels, Role};
 use crate::schemas::full_type_name;
 use crate::tf::{is_static, tf_topic};
-use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
+use gridweave_runtime::message::{Channel, FixedText, MessageHeader, shortened};
 use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, TFMessage, decode};
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
 use std::collections::BTreeMap;
@@ -238,8 +238,11 @@ impl ChannelRouter {
             return Ok(Some(index));
         }
         let index = self.routes.len();
-        let doing = |what: &str| format!("read the topic `{}`: its {what} is too long", channel.topic);
+        let doing = |what: &str| format!("read the topic `{}`: its {what} is too long", shortened(&channel.topic));
         let classified = self.roles.classify(&channel);
+        if let Some(mismatch) = classified.mismatch {
+            output.warn(mismatch);
+        }
         let topic = match FixedText::new(&channel.topic) {
             Err(error) if classified.role == Role::Other => {
                 output.warn(format!("messages on a topic were dropped: its name {error}"));
@@ -259,9 +262,6 @@ impl ChannelRouter {
             topic,
             ..Default::default()
         };
-        if let Some(mismatch) = classified.mismatch {
-            output.warn(mismatch);
-        }
         let (role, robot) = (classified.role, classified.robot.to_owned());
         self.by_channel.insert(channel.clone(), index);
         let latch = Latch::of(&channel, role == Role::Map);

@@ -299,6 +299,20 @@ fn a_robot_whose_name_is_too_long_and_whose_map_is_needed_is_an_error() {
 }
 
 #[test]
+fn a_robot_whose_name_cannot_come_from_ros_is_left_out_with_a_warning() {
+    let topic = format!("/{}/map", "r".repeat(60_000));
+    let (_folder, files) = write(|log| {
+        log.add(&topic, OccupancyGrid::NAME, 1, &grid()).add("/robot1/map", OccupancyGrid::NAME, 2, &grid());
+        log.raw(&topic.replace("/map", "/tag_ranges"), TagRange::NAME, 3, b"?");
+    });
+    let run = run(files);
+    assert_eq!(run.times("map"), [2]);
+    let warned = |text: &str| run.warnings.keys().filter(|warning| warning.contains(text)).count();
+    assert_eq!((warned("the robot's name has 60000 bytes"), warned("at most 128 fit")), (2, 1), "{:?}", run.warnings);
+    assert!(run.warnings.keys().all(|warning| warning.len() < 500), "{:?}", run.warnings);
+}
+
+#[test]
 fn a_source_without_files_is_an_error_with_a_fix() {
     let error = try_run(Vec::new(), "", RobotTopics::default()).err().unwrap().to_string();
     assert!(error.contains("--input"), "{error}");

@@ -127,6 +127,22 @@ fn a_base_and_a_map_with_a_common_ancestor_are_connected() {
 }
 
 #[test]
+fn a_path_is_followed_over_a_thousand_transforms_and_no_further() {
+    let frame = |depth: usize| format!("r1/{depth}");
+    let mut tree = FrameTree::default();
+    for depth in 0..20_000 {
+        let edge = edge(&frame(depth), &frame(depth + 1), 1.0, 0.0, 0.0);
+        assert!(tree.insert(&edge.header.frame_id, &edge.child_frame_id, &edge.transform, false));
+    }
+    let distance = |target: usize, source: usize| Some(tree.lookup(&frame(target), &frame(source))?.translation.x);
+    assert_eq!(distance(500, 1500), Some(1000.0));
+    assert_eq!(distance(1500, 500), Some(-1000.0));
+    assert_eq!(distance(500, 1501), None);
+    assert_eq!(distance(0, 20_000), None);
+    assert_eq!(tree.ancestors(&frame(20_000)).count(), LONGEST_PATH + 1);
+}
+
+#[test]
 fn a_circle_of_frames_ends() {
     let mut tf = robots();
     let circle = [

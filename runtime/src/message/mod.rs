@@ -10,7 +10,7 @@ pub(crate) use blank::write_all;
 pub use blank::{Blank, Filled, Write, write_vec};
 pub use channel::Channel;
 pub use header::{LONGEST_ROBOT_NAME, LONGEST_TOPIC, MessageFlags, MessageHeader};
-pub use text::{FixedText, TextTooLong};
+pub use text::{FixedText, TextTooLong, shortened};
 pub use time::LogTime;
 
 use std::fmt;

@@ -1,6 +1,7 @@
 //! Short text of a fixed size, for shared memory.
 
 use iceoryx2::prelude::ZeroCopySend;
+use std::borrow::Cow;
 use std::fmt;
 
 /// UTF-8 text of at most `N` bytes, padded with zero bytes.
@@ -14,7 +15,7 @@ pub struct FixedText<const N: usize> {
 
 /// A text is too long for its fixed size.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{text}` has {length} bytes, and at most {limit} fit: choose a shorter name")]
+#[error("`{}` has {length} bytes, and at most {limit} fit: choose a shorter name", shortened(text))]
 pub struct TextTooLong {
     /// The text.
     pub text: String,
@@ -22,6 +23,17 @@ pub struct TextTooLong {
     pub length: usize,
     /// The maximum length in bytes.
     pub limit: usize,
+}
+
+/// The largest number of characters of a name in a message to the user.
+const LONGEST_SHOWN: usize = 100;
+
+/// A name for a message to the user: only its beginning, if it is so long that it would hide the rest.
+pub fn shortened(name: &str) -> Cow<'_, str> {
+    match name.char_indices().nth(LONGEST_SHOWN) {
+        Some((end, _)) => Cow::Owned(format!("{}...", &name[..end])),
+        None => Cow::Borrowed(name),
+    }
 }
 
 impl<const N: usize> FixedText<N> {
@@ -97,5 +109,7 @@ mod tests {
     fn a_text_that_is_too_long_is_rejected() {
         let error = FixedText::<8>::new("123456789").unwrap_err();
         assert_eq!((error.length, error.limit), (9, 8));
+        let error = FixedText::<8>::new(&"ö".repeat(60_000)).unwrap_err().to_string();
+        assert!(error.contains("120000 bytes") && error.len() < 400, "{error}");
     }
 }
