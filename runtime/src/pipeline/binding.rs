@@ -106,6 +106,11 @@ impl<'a> Binder<'a> {
 
     /// Reads one entry, for the given port or for the first that fits.
     fn read_entry(&mut self, item: &Item, port: Option<usize>) {
+        // To look for the name that was meant takes longer the more stages there are.
+        if self.problems.is_full() {
+            self.failed.push(port);
+            return;
+        }
         let Some(text) = text("inputs", item, self.problems) else {
             self.failed.push(port);
             return;

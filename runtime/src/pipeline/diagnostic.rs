@@ -78,6 +78,9 @@ impl Diagnostic {
     }
 }
 
+/// The maximum number of errors that are shown. Each shows its line, and one line of a file can have any number of them.
+pub(super) const MOST_SHOWN: usize = 100;
+
 /// The errors of a pipeline collected so far.
 #[derive(Debug)]
 pub(super) struct Problems(PipelineErrors);
@@ -86,7 +89,7 @@ impl Problems {
     /// No errors yet, for a pipeline file.
     pub(super) fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
         let file = SourceText { name: name.into(), text: text.into() };
-        Self(PipelineErrors { sources: vec![file], list: Vec::new() })
+        Self(PipelineErrors { sources: vec![file], list: Vec::new(), has_more: false })
     }
 
     /// Adds another text, such as a setting of the command line. Returns its index, for [`Location`].
@@ -96,7 +99,15 @@ impl Problems {
     }
 
     pub(super) fn push(&mut self, diagnostic: Diagnostic) {
-        self.0.list.push(diagnostic);
+        match self.is_full() {
+            true => self.0.has_more = true,
+            false => self.0.list.push(diagnostic),
+        }
+    }
+
+    /// Whether no further error will be shown.
+    pub(super) fn is_full(&self) -> bool {
+        self.0.list.len() >= MOST_SHOWN
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -111,11 +122,13 @@ impl Problems {
     }
 }
 
-/// All errors of a pipeline, one or more, in the order of the file.
+/// The errors of a pipeline, one or more, in the order of the file: all, up to the maximum that is shown.
 #[derive(Clone, Debug)]
 pub struct PipelineErrors {
     sources: Vec<SourceText>,
     list: Vec<Diagnostic>,
+    /// Whether there are more than these.
+    has_more: bool,
 }
 
 impl PipelineErrors {
@@ -126,7 +139,7 @@ impl PipelineErrors {
         problems.into_errors()
     }
 
-    /// The number of errors.
+    /// The number of errors that are shown.
     pub fn count(&self) -> usize {
         self.list.len()
     }
@@ -142,6 +155,7 @@ impl PipelineErrors {
         }
         let name = self.sources.first().map_or("the pipeline", |file| file.name.as_str());
         let count = match self.list.len() {
+            count if self.has_more => format!("more errors than these {count}: fix these first"),
             1 => "an error".to_owned(),
             count => format!("{count} errors"),
         };

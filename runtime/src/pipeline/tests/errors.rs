@@ -1,6 +1,7 @@
 //! Every error is shown at its location, with what was expected and the most similar valid name.
 
 use super::*;
+use crate::pipeline::diagnostic::MOST_SHOWN;
 use std::path::Path;
 
 #[test]
@@ -24,12 +25,25 @@ fn for_an_unknown_section_or_key_the_most_similar_is_suggested() {
 }
 
 #[test]
+fn of_very_many_errors_the_first_are_shown() {
+    for wrong in ["\"log.map\", ", "\"nothing\", "] {
+        let text = changed("inputs = [", &format!("inputs = [{}", wrong.repeat(20_000)));
+        let errors = parse(&text).unwrap_err();
+        assert_eq!(errors.count(), MOST_SHOWN, "{wrong}");
+        let rendered = errors.render(false);
+        assert!(rendered.contains("has more errors than these 100"), "{wrong}");
+        assert!(rendered.len() < 1_000_000, "{wrong}: {} bytes", rendered.len());
+    }
+}
+
+#[test]
 fn limits_of_processes_are_numbers_that_are_not_negative() {
     for (line, column, underlined, says) in [
         ("stall_timeout = -1.0", "17", "-1.0", "expected seconds, 0 or more"),
         ("stall_timeout = \"long\"", "17", "\"long\"", "expected seconds, 0 or more, found text"),
         ("stall_timeout = nan", "17", "nan", "expected seconds, 0 or more"),
         ("memory_limit = -1", "16", "-1", "expected bytes, 0 or more, found `-1`"),
+        ("same_time_limit = -1", "19", "-1", "expected bytes, 0 or more, found `-1`"),
         ("memory_limit = 1.5", "16", "1.5", "expected bytes, 0 or more, found a number"),
     ] {
         assert_error(("seed = 7", line), &format!("5:{column}"), underlined, &[says]);
