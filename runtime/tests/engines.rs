@@ -133,6 +133,40 @@ fn large_and_small_messages_keep_their_order() {
 }
 
 #[test]
+fn two_readers_of_two_ports_in_opposite_order_do_not_wait_for_each_other() {
+    let mut builder = PipelineBuilder::new(registry());
+    let parameters = "count = 45\nboth = true\nlarge_every = 1\nlarge_size = 200_000";
+    builder.stage("source", "counter", parameters, &[]);
+    builder.stage("one", "recorder", "stall = 50", &["source.a", "source.b"]);
+    builder.stage("other", "recorder", "stall = 50", &["source.b", "source.a"]);
+    builder.stage("same", "counter", &format!("{parameters}\nstep = 0"), &[]);
+    builder.stage("third", "join", "", &["same.b", "source.a"]);
+    builder.stage("fourth", "recorder", "", &["third.out", "same.a", "source.b"]);
+    builder.stage("fifth", "recorder", "", &["same.a", "third.out"]);
+    assert_same_on_every_engine(&builder);
+}
+
+#[test]
+fn large_messages_that_wait_for_each_other_are_limited_in_memory_and_arrive() {
+    let mut builder = PipelineBuilder::new(registry());
+    // Together much more than a link may hold; some have the same log time, and some wait for a silent side.
+    for step in [0, 1] {
+        let parameters = format!("count = 12\nstep = {step}\nboth = true\nlarge_every = 1\nlarge_size = 30_000_000");
+        builder.stage(&format!("source{step}"), "counter", &parameters, &[]);
+        builder.stage(&format!("nothing{step}"), "filter", "keep_every = 0", &[&format!("source{step}.b")]);
+        builder.stage(
+            &format!("sink{step}"),
+            "recorder",
+            "",
+            &[&format!("nothing{step}.out"), &format!("source{step}.a")],
+        );
+    }
+    let pipeline = builder.build(16);
+    let expected = seen(&pipeline, EngineKind::Single);
+    assert_eq!(seen(&pipeline, EngineKind::Threads), expected);
+}
+
+#[test]
 fn a_map_of_17_million_cells_takes_memory_for_what_is_in_flight_only() {
     let mut builder = PipelineBuilder::new(registry());
     builder.stage("source", "counter", "count = 1\nlarge_every = 1\nlarge_size = 17_000_000", &[]);

@@ -16,6 +16,9 @@ use std::rc::Rc;
 /// The number of times that a source advances per round.
 const ADVANCES_PER_ROUND: usize = 64;
 
+/// The memory of what a source has sent to a stage after which its round ends, bytes.
+const BYTES_PER_ROUND: usize = 64 << 20;
+
 struct SingleStage {
     runner: Runner,
     /// The messages received since the last round, by wire.
@@ -100,6 +103,9 @@ impl SingleStage {
             if !self.runner.advance()? {
                 self.end(self.reached());
                 return Ok(());
+            }
+            if self.links.iter().any(|link| link.pending_bytes() >= BYTES_PER_ROUND) {
+                break;
             }
         }
         let watermark = self.reached();

@@ -39,6 +39,11 @@ impl DirectLink {
         self.readers.iter().for_each(|(queue, _)| queue.borrow_mut().end(time));
     }
 
+    /// The memory of the messages that wait in the queue of a reader, bytes: of the one where it is most.
+    pub fn pending_bytes(&self) -> usize {
+        self.readers.iter().map(|(queue, _)| queue.borrow().bytes()).max().unwrap_or_default()
+    }
+
     /// The log time that the link has reached.
     pub fn reached(&self) -> LogTime {
         self.sequence.borrow().reached()
@@ -64,5 +69,23 @@ impl OutputSink for DirectLink {
         let bytes = write_vec(Vec::new(), header.length as usize, write)?;
         self.deliver(header, bytes);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::message::MessageFlags;
+
+    #[test]
+    fn what_waits_is_known_until_it_is_taken() {
+        let (mut link, queue) = (DirectLink::default(), SharedQueue::default());
+        assert_eq!(link.pending_bytes(), 0);
+        link.add_reader(Rc::clone(&queue), 0);
+        let header = MessageHeader { flags: MessageFlags::DATA, length: 1000, ..Default::default() };
+        link.send(header, &[0; 1000]).unwrap();
+        assert!(link.pending_bytes() > 1000);
+        InputQueue::default().append(&mut queue.borrow_mut());
+        assert_eq!(link.pending_bytes(), 0);
     }
 }

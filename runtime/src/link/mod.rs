@@ -27,9 +27,9 @@
 //!    window, samples sent before the reader has connected could be lost. Before its first sample of a sender, a reader does
 //!    not know the sender's current number: the window says so, and the credit is the reader's depth.
 //! 3. **Credit.** A sender sends a sample that lies within the windows of all readers, and waits otherwise. It never blocks
-//!    inside iceoryx2. In a replay it waits for every reader. In a live run it does not wait for a reader whose process is
-//!    gone, and never waits on a link that drops the oldest message: iceoryx2 drops it, and the reader counts the gap in the
-//!    numbers.
+//!    inside iceoryx2. In a replay it waits for every reader, and also while samples that a reader has not taken take much
+//!    memory. In a live run it does not wait for a reader whose process is gone, and never waits on a link that drops the
+//!    oldest message: iceoryx2 drops it, and the reader counts the gap in the numbers.
 //! 4. **Release.** A reader advances the window when the stage has taken all messages of a sample. The memory is released when
 //!    the last of them is dropped. A reader that already borrows many samples copies further ones.
 //! 5. **Sleeping.** Each stage has a *doorbell* (an event) in the shared counters. A stage with nothing to do marks the doorbell
@@ -59,9 +59,11 @@ mod names;
 mod observer;
 mod order;
 mod outputs;
+mod pending_samples;
 mod protocol;
 #[cfg(test)]
 mod protocol_model;
+mod reader_credit;
 mod receiver;
 mod repeats;
 mod sample;

@@ -3,6 +3,7 @@
 use super::borrowed_samples::BorrowedSamples;
 use super::counters::MAX_SENDERS;
 use super::heap::HeapLink;
+use super::pending_samples::MOST_PENDING_BYTES;
 use super::protocol::NOTHING_RECEIVED;
 use super::repeats::Repeats;
 use super::sample_tracker::SampleTracker;
@@ -157,16 +158,21 @@ impl<S: Service + 'static> LinkReceiver<S> {
         is_last
     }
 
-    /// Grants credit beyond the depth where the stage would be stuck otherwise: if all pending messages have the same log
-    /// time, no watermark can pass it, and the stage cannot take them.
+    /// Grants credit beyond the depth, or beyond the memory of pending samples, where the stage would be stuck otherwise: if
+    /// all pending messages have the same log time, no watermark can pass it, and the stage cannot take them.
     pub(crate) fn extend_credit(&mut self, queue: &InputQueue) {
         if queue.is_empty() || !queue.has_single_log_time() {
             return;
         }
         let (counters, wire, depth) = (&self.end.counters, self.end.wire, self.end.depth as u64);
+        let is_large = queue.bytes() as u64 >= MOST_PENDING_BYTES;
         for known in self.known.values_mut() {
-            if known.tracker.next() == Some(known.limit) {
-                known.raise(known.limit + depth, counters, wire);
+            // To the sender, all that was received counts as taken.
+            if let Some(next) = known.tracker.next()
+                && next + depth > known.limit
+                && (next == known.limit || is_large)
+            {
+                known.raise(next + depth, counters, wire);
                 self.freed += 1;
             }
         }

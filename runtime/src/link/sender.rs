@@ -3,7 +3,9 @@
 use super::counters::monotonic_nanoseconds;
 use super::heap::HeapLink;
 use super::history::History;
-use super::protocol::{NOTHING_RECEIVED, ring};
+use super::pending_samples::PendingSamples;
+use super::protocol::ring;
+use super::reader_credit::Reader;
 use super::receiver::ReaderEnd;
 use super::sample::Batch;
 use super::service::origin;
@@ -37,34 +39,6 @@ pub enum SenderRole {
     External,
 }
 
-/// The sender's state for one reader.
-struct Reader {
-    end: ReaderEnd,
-    /// The number of the first sample for which there is no credit, as last read.
-    limit: u64,
-    /// When the reading stage was started, as last seen while it had not received a sample of this sender.
-    started: u64,
-    /// The number of the sample that was next at that moment.
-    first: u64,
-}
-
-impl Reader {
-    /// The number of the first sample without credit, read from the shared counters, for the sender `origin` whose next sample
-    /// is `number`; none while the reader is not connected to it.
-    fn limit(&mut self, origin: u64, number: u64) -> Option<u64> {
-        match self.end.counters.limit_of(self.end.wire, origin)? {
-            NOTHING_RECEIVED => {
-                let started = self.end.counters.get(StageCounter::Started);
-                if self.started != started {
-                    (self.started, self.first) = (started, number);
-                }
-                Some(self.first.saturating_add(self.end.depth as u64))
-            }
-            limit => Some(limit),
-        }
-    }
-}
-
 /// A sending end of a link.
 pub struct LinkSender<S: Service> {
     publisher: Publisher<S, [u8], SampleHeader>,
@@ -84,6 +58,7 @@ pub struct LinkSender<S: Service> {
     origin: u64,
     /// The number of the next sample.
     number: u64,
+    pending: PendingSamples,
     /// The log time of the end of the stream, once it was sent.
     ended: Option<LogTime>,
     sequence: Sequence,
@@ -119,7 +94,6 @@ impl<S: Service + 'static> LinkSender<S> {
         }
         port.counters.add_sender(port.port);
         ring(readers.iter().map(|reader| reader.counters.doorbell()));
-        let reader = |end: ReaderEnd| Reader { end, limit: 0, started: 0, first: 0 };
         Ok(Self {
             heap: names.heap_link(&name),
             shared_memory: names.is_shared().then(SharedMemory::default),
@@ -128,11 +102,12 @@ impl<S: Service + 'static> LinkSender<S> {
             order: shape.order,
             overflow: shape.overflow,
             role,
-            readers: readers.into_iter().map(reader).collect(),
+            readers: readers.into_iter().map(Reader::new).collect(),
             port,
             history,
             origin,
             number: 0,
+            pending: PendingSamples::default(),
             ended: None,
             sequence: Sequence::new(shape.order),
             batch: Batch::default(),
@@ -154,7 +129,17 @@ impl<S: Service + 'static> LinkSender<S> {
                 reader.limit = reader.limit(origin, number).unwrap_or_default();
             }
             number < reader.limit
-        })
+        }) && self.has_memory()
+    }
+
+    /// Whether the samples that a reader has not taken leave memory for another one. Live links have a few samples at most.
+    fn has_memory(&mut self) -> bool {
+        if self.order == Order::LogTime && self.pending.is_full() {
+            let (origin, number) = (self.origin, self.number);
+            let taken = self.readers.iter_mut().map(|reader| reader.taken(origin, number)).min();
+            self.pending.release(taken.unwrap_or(number));
+        }
+        self.order == Order::Arrival || !self.pending.is_full()
     }
 
     /// Whether every live reader is connected to this sender.
@@ -366,6 +351,9 @@ impl<S: Service + 'static> LinkSender<S> {
         // Observers are counted too, if their buffers have space.
         if self.order == Order::LogTime && reached < self.readers.len() {
             return Err(LinkError::Lost { link: self.name.clone(), reached, readers: self.readers.len() });
+        }
+        if self.order == Order::LogTime && header.count == 1 && header.message.length > LARGEST_BATCHED as u64 {
+            self.pending.push(self.number, header.message.length);
         }
         self.number += 1;
         self.ring();
