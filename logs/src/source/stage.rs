@@ -12,6 +12,9 @@ use gridweave_runtime::stage::{Context, Output, Source, StageError};
 /// The number of messages that are read at a time.
 const BATCH: usize = 64;
 
+/// The size of messages after which no more are read at a time, bytes.
+const BATCH_BYTES: usize = 16 << 20;
+
 /// Reads logs; see the [module](super).
 pub struct McapSource {
     reader: LogReader,
@@ -105,11 +108,14 @@ impl Source for McapSource {
     type Outputs = RobotMessages;
 
     fn next(&mut self, output: &Output<RobotMessages>) -> Result<bool, StageError> {
-        for _ in 0..BATCH {
+        let (mut count, mut bytes) = (0, 0);
+        while count < BATCH && bytes < BATCH_BYTES {
             let Some(message) = self.reader.next_message() else { return self.end(output) };
             if message.log_time > self.window.end {
                 return self.end(output);
             }
+            count += 1;
+            bytes += message.data.len();
             if message.log_time < self.window.start
                 && let Some(latched) = &mut self.latched
             {
