@@ -13,15 +13,35 @@ pub(super) struct LineFit {
 pub(super) struct CellRows {
     /// Start of each row in `columns`, and the end of the last.
     starts: Vec<usize>,
-    /// Columns, rising within a row.
-    columns: Vec<usize>,
+    /// Columns, rising within a row. Sides of grids are less than 2^32.
+    columns: Vec<u32>,
 }
 
 impl CellRows {
     /// Cells sorted by row and column, in a grid of `height` rows.
-    pub(super) fn new(cells: &[Cell], height: usize) -> Self {
-        let starts = (0..=height).map(|row| cells.partition_point(|cell| cell.row < row)).collect();
-        Self { starts, columns: cells.iter().map(|cell| cell.column).collect() }
+    pub(super) fn new(cells: impl Iterator<Item = Cell>, height: usize) -> Self {
+        let (mut starts, mut columns) = (Vec::with_capacity(height + 1), Vec::new());
+        for cell in cells {
+            while starts.len() <= cell.row {
+                starts.push(columns.len());
+            }
+            columns.push(cell.column as u32);
+        }
+        starts.resize(height + 1, columns.len());
+        Self { starts, columns }
+    }
+
+    /// The number of cells.
+    pub(super) fn len(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// The cells, row by row.
+    pub(super) fn cells(&self) -> impl Iterator<Item = Cell> {
+        let rows = self.starts.windows(2).enumerate();
+        rows.flat_map(|(row, ends)| {
+            self.columns[ends[0]..ends[1]].iter().map(move |column| Cell { column: *column as usize, row })
+        })
     }
 
     /// The columns of a row's cells from `first` to `last`; none for a row outside the grid.
@@ -30,8 +50,8 @@ impl CellRows {
             (Some(&start), Some(&end)) => &self.columns[start..end],
             _ => &[],
         };
-        let start = columns.partition_point(|column| *column < first);
-        columns[start..].iter().copied().take_while(move |column| *column <= last)
+        let start = columns.partition_point(|column| (*column as usize) < first);
+        columns[start..].iter().map(|column| *column as usize).take_while(move |column| *column <= last)
     }
 }
 
@@ -99,7 +119,8 @@ mod tests {
     fn a_window_contains_the_cells_within_its_radius() {
         let cells: Vec<Cell> =
             (0..900).filter(|i| i * 7 % 11 < 4).map(|i| Cell { column: i % 30, row: i / 30 }).collect();
-        let rows = CellRows::new(&cells, 30);
+        let rows = CellRows::new(cells.iter().copied(), 30);
+        assert_eq!((rows.len(), rows.cells().collect::<Vec<_>>()), (cells.len(), cells.clone()));
         for (radius, cell) in
             [(2.0, Cell { column: 0, row: 0 }), (4.7, cells[100]), (9.0, Cell { column: 29, row: 28 })]
         {

@@ -1,6 +1,7 @@
 //! Walls and known space of one map, for registration and verification.
 
 use super::extents::{WallExtent, extents};
+use super::stride;
 use super::wall_line::{CellRows, LineFit, Window};
 use crate::shared::deformation::Deformation;
 use crate::shared::geometry::{Cell, Grid, Point2, PointIndex, is_free, is_known, is_occupied};
@@ -8,6 +9,10 @@ use nalgebra::Vector2;
 
 /// Distance between the samples of known space, metres.
 const SAMPLE_SPACING: f64 = 0.2;
+/// Most points of walls, more than those of any published map of a building, and most samples of known space: the memory and
+/// the time of a comparison go with them. Beyond it only some are taken, evenly.
+const MOST_POINTS: usize = 1 << 20;
+const MOST_SAMPLES: usize = 1 << 24;
 /// Side of a bucket of wall points, metres: near the last search radius of a registration, so that nine buckets
 /// contain the answer.
 const BUCKET_SIDE: f64 = 0.2;
@@ -18,8 +23,8 @@ const MOST_UNKNOWN: isize = 2;
 /// A map's walls as points with normals, and samples of its known space.
 #[derive(Clone, Debug)]
 pub struct WallMap {
-    /// The walls: one point for each occupied cell that faces known space, moved onto the line through its
-    /// neighbours.
+    /// The walls: one point for each occupied cell that faces known space, or for some of very many, moved onto the line
+    /// through its neighbours.
     pub walls: PointIndex,
     /// Unit normals of the walls, in the order of the index; zero where the neighbours show no line.
     pub normals: Vec<Vector2<f64>>,
@@ -47,16 +52,18 @@ impl WallMap {
     /// metres, and at least from the cells two away.
     pub fn new(grid: &Grid<'_>, normal_radius: f64) -> Self {
         let resolution = grid.geometry.resolution;
-        let cells: Vec<Cell> = grid.occupied().filter(|cell| faces_known_space(grid, *cell)).collect();
-        let rows = CellRows::new(&cells, grid.geometry.height);
+        let cells = grid.occupied().filter(|cell| faces_known_space(grid, *cell));
+        let rows = CellRows::new(cells, grid.geometry.height);
+        let step = stride(rows.len(), MOST_POINTS);
+        let spacing = resolution * step as f64;
         let window = Window::new(normal_radius / resolution);
-        let fits: Vec<LineFit> = cells.iter().map(|cell| window.fit(&rows, *cell)).collect();
+        let fits: Vec<LineFit> = rows.cells().step_by(step).map(|cell| window.fit(&rows, cell)).collect();
         let points: Vec<Point2> = fits.iter().map(|fit| grid.geometry.origin * (fit.point * resolution)).collect();
         let (walls, order) = PointIndex::new(&points, BUCKET_SIDE);
         let normals: Vec<_> = order.iter().map(|&i| grid.geometry.origin.rotation * fits[i].normal).collect();
-        let extents = extents(&walls, &normals, resolution);
+        let extents = extents(&walls, &normals, spacing);
         let (samples, sample_area) = known_samples(grid);
-        Self { walls, normals, extents, spacing: resolution, samples, sample_area }
+        Self { walls, normals, extents, spacing, samples, sample_area }
     }
 
     /// The same walls and samples, displaced by a deformation. Its turns are so small that the normals stay.
@@ -89,7 +96,8 @@ fn faces_known_space(grid: &Grid<'_>, cell: Cell) -> bool {
 /// Known cells at about [`SAMPLE_SPACING`], and the area per sample.
 fn known_samples(grid: &Grid<'_>) -> (Vec<KnownSample>, f64) {
     let resolution = grid.geometry.resolution;
-    let stride = (SAMPLE_SPACING / resolution).round().clamp(1.0, 1e6) as usize;
+    let least = (grid.geometry.cell_count() as f64 / MOST_SAMPLES as f64).sqrt().ceil().max(1.0);
+    let stride = (SAMPLE_SPACING / resolution).round().clamp(least, 1e6) as usize;
     let (width, height) = (grid.geometry.width, grid.geometry.height);
     let mut samples = Vec::new();
     for row in (stride / 2..height).step_by(stride) {
@@ -171,6 +179,18 @@ mod tests {
     fn a_single_cell_has_no_direction() {
         let map = map_of(|x, y| if x == 30.5 && y == 30.5 { 100 } else { 0 });
         assert_eq!(map.normals, [Vector2::zeros()]);
+    }
+
+    #[test]
+    fn of_very_many_walls_some_stand_for_all() {
+        let (width, height) = (2_100, 1_000);
+        let geometry = GridGeometry { width, height, resolution: 0.05, origin: pose(0.0, 0.0, 0.0) };
+        let cells: Vec<i8> = (0..width * height).map(|index| if index % 2 == 0 { 100 } else { 0 }).collect();
+        let map = WallMap::new(&Grid::new(geometry, &cells).unwrap(), 0.1);
+        let points = map.walls.points().len();
+        assert!(points <= MOST_POINTS, "{points}");
+        let length = points as f64 * map.spacing;
+        assert!((length - 0.05 * (width * height / 2) as f64).abs() < 1.0, "{length} m");
     }
 
     #[test]
