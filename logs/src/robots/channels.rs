@@ -112,14 +112,10 @@ impl RobotChannels {
         };
         let (mut asking, mut with_poses) = (BTreeSet::new(), BTreeSet::new());
         let channels: Vec<&Channel> = channels.collect();
-        let has_map = |robot: &str| {
-            let roles = &roles;
-            channels
-                .iter()
-                .any(|channel| roles.classify(channel) == Classified { role: Role::Map, robot, mismatch: None })
-        };
+        let maps = channels.iter().map(|channel| roles.classify(channel)).filter(|channel| channel.role == Role::Map);
+        let with_maps: BTreeSet<&str> = maps.map(|channel| channel.robot).collect();
         let scanned = channels.iter().filter_map(|channel| roles.scanning_robot(channel));
-        roles.scanned = scanned.filter(|robot| !has_map(robot)).map(str::to_owned).collect();
+        roles.scanned = scanned.filter(|robot| !with_maps.contains(robot)).map(str::to_owned).collect();
         for channel in &channels {
             let Classified { role, robot, .. } = roles.classify(channel);
             if role == Role::Map {
