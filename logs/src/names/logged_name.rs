@@ -19,9 +19,7 @@ pub(super) enum LoggedName {
 impl LoggedName {
     /// The robots in the channels of an input.
     pub(super) fn of(input: &Input, channels: &[&Channel], rules: &NameRules, robots: &RobotTopics) -> Self {
-        let Some(robot) = input.robot.as_ref().filter(|_| rules.convention == Convention::ByRobot) else {
-            return Self::Same;
-        };
+        let Some(robot) = &input.robot else { return Self::Same };
         let roles = RobotChannels::new(robots.clone(), channels.iter().copied());
         let of_role = |is_of: fn(Role) -> bool| -> BTreeSet<String> {
             let classified = channels.iter().map(|channel| roles.classify(channel));
@@ -45,7 +43,9 @@ impl LoggedName {
         }
         let mut with_maps = of_role(|role| role == Role::Map);
         with_maps.remove(robot);
-        if with_maps.is_empty() { Self::Same } else { Self::Several(with_maps) }
+        // Where no robot is looked for, it does not matter that none is found.
+        let matters = !with_maps.is_empty() && rules.convention == Convention::ByRobot;
+        if matters { Self::Several(with_maps) } else { Self::Same }
     }
 
     /// The name of the robot in the log, if it is another than the user gives.

@@ -132,7 +132,10 @@ fn a_log_that_has_another_name_for_its_robot_gets_the_one_that_is_given() {
     log.add("/robot1/map", OccupancyGrid::NAME, 1, &map).add("/tf", TFMessage::NAME, 2, &tf).raw("/x", "p/X", 3, b"");
     let path = folder.write("a.mcap", &log.finish());
     let input = Input { robot: Some("a".into()), path };
-    assert_eq!(topics(std::slice::from_ref(&input), &NameRules::default()), [["/a/map", "/tf", "/a/x"]]);
+    for convention in [Convention::ByRobot, Convention::AsLogged] {
+        let rules = NameRules { convention, ..Default::default() };
+        assert_eq!(topics(std::slice::from_ref(&input), &rules), [["/a/map", "/tf", "/a/x"]]);
+    }
     let (mut reader, names) = open(&[input], &NameRules::default(), &RobotTopics::default()).unwrap();
     let mut copy = Vec::new();
     names.rename_frames(&reader.next_message().unwrap(), &mut copy);
