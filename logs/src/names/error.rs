@@ -30,7 +30,7 @@ pub enum NameError {
     /// Two logs of one time have maps of robots with one name, which would be taken for one robot.
     #[error(
         "both {one} and {other} have maps of `{robot}` at the same time: if these are two robots, name them: A={one} B={other}; if \
-         they are one, give one of the logs",
+         they are one, leave its maps out of one of the logs (`gridweave filter --topics`)",
         one = .one.display(),
         other = .other.display()
     )]

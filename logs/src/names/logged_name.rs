@@ -2,6 +2,7 @@
 
 use super::{Convention, Input, NameRules};
 use crate::robots::{RobotChannels, Role};
+use crate::tf::tf_topic;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::stage::RobotTopics;
 use std::collections::BTreeSet;
@@ -27,12 +28,14 @@ impl LoggedName {
             named.map(|found| found.robot.to_owned()).collect()
         };
         let topics: BTreeSet<&str> = channels.iter().map(|channel| channel.topic.as_str()).collect();
-        // Each of its topics is free without the name.
+        // What is the robot's is under its name, and no topic under its name would be another one without it.
         let can_drop = |name: &String| {
             let under = format!("/{name}");
-            channels.iter().filter(|channel| roles.classify(channel).robot == name).all(|channel| {
-                let rest = channel.topic.strip_prefix(&under).filter(|rest| rest.starts_with('/'));
-                rest.is_some_and(|rest| !topics.contains(rest))
+            channels.iter().all(|channel| {
+                match channel.topic.strip_prefix(&under).filter(|rest| rest.starts_with('/')) {
+                    Some(rest) => tf_topic(channel).is_some() || !topics.contains(rest),
+                    None => roles.classify(channel).robot != name,
+                }
             })
         };
         let mut all = of_role(|role| !matches!(role, Role::Other | Role::Tf));

@@ -147,6 +147,14 @@ fn a_log_that_has_another_name_for_its_robot_gets_the_one_that_is_given() {
 }
 
 #[test]
+fn a_name_stays_in_topics_that_would_be_others_without_it() {
+    let folder = Folder::new();
+    let scans = [("/robot1/map", OccupancyGrid::NAME), ("/robot1/scan", SCAN), ("/scan", SCAN)];
+    let input = Input { robot: Some("a".into()), path: log(&folder, "a.mcap", &scans) };
+    assert_eq!(topics(&[input], &NameRules::default()), [["/a/robot1/map", "/a/robot1/scan", "/a/scan"]]);
+}
+
+#[test]
 fn two_logs_of_one_time_do_not_give_one_robot_two_maps() {
     let folder = Folder::new();
     let write = |name: &str, from: u64| {
