@@ -2,7 +2,7 @@
 
 use crate::shared::geometry::relative_pose::{self, rotation_of_pose};
 use crate::shared::geometry::{Point2, Pose2, quarter_turn};
-use crate::shared::sparse::{Columns, Dissection, factor};
+use crate::shared::sparse::{Columns, factor, nested_dissection};
 use nalgebra::{Matrix3, UnitComplex, Vector3};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -102,11 +102,11 @@ impl PoseGraph {
             of_node.dedup();
         }
         let places: Vec<Point2> = self.poses.iter().map(|pose| pose.translation.vector.into()).collect();
-        let order = Dissection::new(&places, &neighbours);
+        let order = nested_dissection(&places, &neighbours);
         let mut columns: Columns = vec![Vec::new(); count];
         let mut vector = vec![Vector3::zeros(); count];
         let mut add = |row: usize, column: usize, block: Matrix3<f64>| {
-            let (row, column) = (order.places[row], order.places[column]);
+            let (row, column) = (order[row], order[column]);
             if row >= column {
                 columns[column].push((row, block));
             }
@@ -124,14 +124,14 @@ impl PoseGraph {
             let sides = [(constraint.from, by_from), (constraint.to, by_to)];
             for (row, by_row) in &sides {
                 let weighted = by_row.transpose() * information;
-                vector[order.places[*row]] -= weighted * residual;
+                vector[order[*row]] -= weighted * residual;
                 for (column, by_column) in &sides {
                     add(*row, *column, weighted * by_column);
                 }
             }
         }
-        let solved = factor(&columns, &order.whole)?.solve(&vector);
-        let moves: Vec<Vector3<f64>> = order.places.iter().map(|&place| solved[place]).collect();
+        let solved = factor(&columns)?.solve(&vector);
+        let moves: Vec<Vector3<f64>> = order.iter().map(|&place| solved[place]).collect();
         moves.iter().all(|step| step.iter().all(|value| value.is_finite())).then_some(moves)
     }
 

@@ -1,6 +1,6 @@
 //! A placed map for the refinement: its walls, the sides from which they are seen, and its lattice.
 
-use crate::shared::deformation::{Corners, Lattice};
+use crate::shared::deformation::{Corners, Deformation, Lattice};
 use crate::shared::geometry::{Grid, Point2, Pose2, is_free};
 use crate::shared::walls::{LEAST_NORMAL_AGREEMENT, WallMap, before_wall};
 use nalgebra::Vector2;
@@ -17,6 +17,8 @@ pub struct Body<'a> {
     pub(super) transform_world_map: Pose2,
     /// Whether it is not deformed.
     pub(super) is_kept: bool,
+    /// Its deformation as it was estimated before.
+    pub(super) known: Option<Deformation>,
 }
 
 /// The walls of a map with the nodes around them, in its own frame.
@@ -28,8 +30,6 @@ pub(super) struct Shape {
     pub(super) lattice: Lattice,
     /// For each point of the walls, the nodes around it.
     pub(super) corners: Vec<Option<Corners>>,
-    /// Lower and upper corner of the bounding box of the walls; none without walls.
-    pub(super) bounds: Option<[Point2; 2]>,
 }
 
 /// Sides from which a wall is seen: that of its normal, and the opposite one.
@@ -52,10 +52,8 @@ impl<'a> Body<'a> {
             .collect();
         let lattice = Lattice::over(grid, spacing);
         let corners = walls.walls.points().iter().map(|point| lattice.corners(point)).collect();
-        let grow = |[low, high]: [Point2; 2], point: &Point2| [low.inf(point), high.sup(point)];
-        let bounds = walls.walls.points().first().map(|first| walls.walls.points().iter().fold([*first; 2], grow));
-        let shape = Arc::new(Shape { seen, lattice, corners, bounds });
-        Self { walls, shape, transform_world_map, is_kept: false }
+        let shape = Arc::new(Shape { seen, lattice, corners });
+        Self { walls, shape, transform_world_map, is_kept: false, known: None }
     }
 
     /// The same map at another pose.
@@ -68,6 +66,14 @@ impl<'a> Body<'a> {
     #[must_use]
     pub fn kept(self) -> Self {
         Self { is_kept: true, ..self }
+    }
+
+    /// The same map, deformed as it was estimated before at this place, so that new maps are first aligned with it. A
+    /// deformation on another lattice is that of another map, and is ignored.
+    #[must_use]
+    pub fn deformed(self, known: Deformation) -> Self {
+        let known = Some(known).filter(|known| known.lattice == self.shape.lattice);
+        Self { known, ..self }
     }
 }
 

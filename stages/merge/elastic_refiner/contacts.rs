@@ -3,9 +3,9 @@
 use super::body::Body;
 use super::equations::Equations;
 use crate::shared::deformation::{Corners, Deformation, node_jacobian};
-use crate::shared::geometry::Point2;
+use crate::shared::geometry::{Point2, PointIndex};
 use crate::shared::walls::{CORRELATION_LENGTH, DEVIATION, stride};
-use nalgebra::{RowVector3, SMatrix, SVector, Vector2};
+use nalgebra::{Matrix3, RowVector3, Vector2, Vector3};
 use std::collections::BTreeMap;
 
 /// Most points of the walls of a map that are looked up in another.
@@ -17,13 +17,15 @@ const SPACING_BY_REACH: f64 = 0.25;
 
 /// Nodes of one contact: four of each map.
 const NODES: usize = 8;
-const UNKNOWNS: usize = 3 * NODES;
+/// Pairs of them, each once.
+const PAIRS: usize = NODES * (NODES + 1) / 2;
 
 /// Sum of the contacts of the same nodes.
 struct Sum {
     nodes: [usize; NODES],
-    information: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
-    vector: SVector<f64, UNKNOWNS>,
+    /// Of each node with those before it and with itself.
+    information: [Matrix3<f64>; PAIRS],
+    vector: [Vector3<f64>; NODES],
 }
 
 /// Contacts of the walls of map b with walls of map a within `reach`.
@@ -33,49 +35,77 @@ pub(super) struct Contacts {
     pub(super) length: f64,
 }
 
-/// A map with its current deformation, and the index of its first node among those of all maps.
-#[derive(Clone, Copy)]
+/// A map with its current deformation.
 pub(super) struct DeformedBody<'a> {
-    pub(super) body: &'a Body<'a>,
-    pub(super) deformation: &'a Deformation,
+    body: &'a Body<'a>,
+    pub(super) deformation: Deformation,
+    /// Index of its first node among those of all maps.
     pub(super) first: usize,
+    /// Points of the walls, world; not a number where there is no node around.
+    points: Vec<Point2>,
+    /// The same points for the search of the nearest, and the place of each of them in `points`.
+    index: (PointIndex, Vec<usize>),
 }
 
-impl DeformedBody<'_> {
-    /// Position of a point of the walls, world, and the nodes around it.
-    fn in_world(&self, index: usize) -> Option<(Point2, Corners)> {
-        let corners = self.body.shape.corners[index]?;
-        let point = self.body.walls.walls.points()[index];
-        Some((self.body.transform_world_map * self.deformation.apply_at(&point, &corners), corners))
+impl<'a> DeformedBody<'a> {
+    /// A map with a deformation, and the index of its first node among those of all maps.
+    pub(super) fn new(body: &'a Body<'a>, deformation: Deformation, first: usize) -> Self {
+        let points = body.walls.walls.points().iter().zip(&body.shape.corners);
+        let in_world = |(point, corners): (&Point2, &Option<Corners>)| match corners {
+            Some(corners) => body.transform_world_map * deformation.apply_at(point, corners),
+            None => Point2::new(f64::NAN, f64::NAN),
+        };
+        let points: Vec<Point2> = points.map(in_world).collect();
+        let index = PointIndex::new(&points, body.walls.walls.buckets().side);
+        Self { body, deformation, first, points, index }
     }
 
-    /// Lower and upper corner of the bounding box of everything within `reach` of the walls, wherever they are
-    /// deformed to, map frame.
-    fn bounds(&self, reach: f64) -> Option<[Point2; 2]> {
-        let margin = Vector2::repeat(reach + self.deformation.largest_move());
-        self.body.shape.bounds.map(|[low, high]| [low - margin, high + margin])
+    /// Position of a node without deformation, world.
+    pub(super) fn node_in_world(&self, node: usize) -> Point2 {
+        self.body.transform_world_map * self.deformation.lattice.position(node)
+    }
+
+    /// Deforms it otherwise.
+    pub(super) fn deform(&mut self, deformation: Deformation) {
+        *self = Self::new(self.body, deformation, self.first);
     }
 }
 
 /// Looks the walls of map b up in map a. A pair at a distance of `reach` metres counts a quarter of one at distance
 /// 0, and farther ones count nothing.
-pub(super) fn contacts(a: DeformedBody<'_>, b: DeformedBody<'_>, reach: f64) -> Contacts {
+pub(super) fn contacts(a: &DeformedBody<'_>, b: &DeformedBody<'_>, reach: f64) -> Contacts {
     let (length, found) = find_all(a, b, reach);
     // Both maps are looked up in each other, so each counts one half.
     let weight = 0.5 * (length / CORRELATION_LENGTH).min(1.0) / DEVIATION.powi(2);
-    let mut sums: BTreeMap<[usize; NODES], Sum> = BTreeMap::new();
+    let mut sums: Vec<Sum> = Vec::new();
+    let mut number_of: BTreeMap<[usize; NODES], usize> = BTreeMap::new();
     let mut matched = 0.0;
     for (point, contact) in found {
         let kernel = (1.0 / (1.0 + (contact.residual / reach).powi(2))).powi(2);
         matched += kernel * length;
         let nodes = contact.nodes(a.first, b.first);
-        let row = contact.row(a, b, &point);
-        let sum =
-            sums.entry(nodes).or_insert_with(|| Sum { nodes, information: SMatrix::zeros(), vector: SVector::zeros() });
-        sum.information.ger(weight * kernel, &row, &row, 1.0);
-        sum.vector.axpy(weight * kernel * contact.target, &row, 1.0);
+        let number = *number_of.entry(nodes).or_insert(sums.len());
+        if number == sums.len() {
+            let information = [Matrix3::zeros(); PAIRS];
+            sums.push(Sum { nodes, information, vector: [Vector3::zeros(); NODES] });
+        }
+        sums[number].add(&contact.row(a, b, &point), contact.target, weight * kernel);
     }
-    Contacts { sums: sums.into_values().collect(), length: matched }
+    Contacts { sums, length: matched }
+}
+
+impl Sum {
+    /// Adds an equation: the product of its row with the moves of the nodes is to be `target`.
+    fn add(&mut self, row: &[Vector3<f64>; NODES], target: f64, weight: f64) {
+        let mut pairs = self.information.iter_mut();
+        for (node, of_node) in row.iter().enumerate() {
+            let weighted = weight * of_node;
+            self.vector[node] += target * weighted;
+            for (of_other, information) in row[..=node].iter().zip(pairs.by_ref()) {
+                *information += weighted * of_other.transpose();
+            }
+        }
+    }
 }
 
 /// Distance between two drawings of a wall, across the wall, metres.
@@ -88,7 +118,11 @@ pub(super) struct Apart {
 
 /// Points of the walls of map b within `reach` of walls of map a, with deformation: the length of wall per point,
 /// metres, and the distances.
-pub(super) fn apart<'a>(a: DeformedBody<'a>, b: DeformedBody<'a>, reach: f64) -> (f64, impl Iterator<Item = Apart>) {
+pub(super) fn apart<'a>(
+    a: &'a DeformedBody<'a>,
+    b: &'a DeformedBody<'a>,
+    reach: f64,
+) -> (f64, impl Iterator<Item = Apart>) {
     let (length, found) = find_all(a, b, reach);
     (length, found.map(|(_, contact)| Apart { rigid: contact.target.abs(), deformed: contact.residual.abs() }))
 }
@@ -97,10 +131,11 @@ impl Contacts {
     /// Adds the contacts to the equations.
     pub(super) fn add_to(&self, equations: &mut Equations) {
         for Sum { nodes, information, vector } in &self.sums {
-            for (i, &row) in nodes.iter().enumerate() {
-                equations.add_vector(row, &vector.fixed_rows::<3>(3 * i).into_owned());
-                for (j, &column) in nodes.iter().enumerate() {
-                    equations.add(row, column, || information.fixed_view::<3, 3>(3 * i, 3 * j).into_owned());
+            let mut pairs = information.iter();
+            for (place, (&node, part)) in nodes.iter().zip(vector).enumerate() {
+                equations.add_vector(node, part);
+                for (&other, block) in nodes[..=place].iter().zip(pairs.by_ref()) {
+                    equations.add(node, other, block);
                 }
             }
         }
@@ -127,47 +162,45 @@ struct Contact {
 
 /// Points of the walls of map b with their partners in map a, and the length of wall per point, metres.
 fn find_all<'a>(
-    a: DeformedBody<'a>,
-    b: DeformedBody<'a>,
+    a: &'a DeformedBody<'a>,
+    b: &'a DeformedBody<'a>,
     reach: f64,
 ) -> (f64, impl Iterator<Item = (Point2, Contact)>) {
     let points = b.body.walls.walls.points();
     let spacing = LEAST_SPACING.max((SPACING_BY_REACH * reach).min(CORRELATION_LENGTH));
     let every = stride(points.len(), MOST_POINTS).max((spacing / b.body.walls.spacing).round() as usize);
-    let bounds = a.bounds(reach);
+    let mut last_partner = usize::MAX;
     let found = points.iter().enumerate().step_by(every);
-    let found = found.filter_map(move |(index, point)| Some((*point, find((a, &bounds?), b, index, point, reach)?)));
+    let found = found.filter_map(move |(index, point)| Some((*point, find(a, b, index, reach, &mut last_partner)?)));
     (every as f64 * b.body.walls.spacing, found)
 }
 
-/// Partner of a point of the walls of map b within `reach` in map a, whose walls are all within the rectangle.
+/// Partner of a point of the walls of map b within `reach` in map a. The partner of the point before may be near.
 fn find(
-    (a, [low, high]): (DeformedBody<'_>, &[Point2; 2]),
-    b: DeformedBody<'_>,
+    a: &DeformedBody<'_>,
+    b: &DeformedBody<'_>,
     index: usize,
-    point: &Point2,
     reach: f64,
+    last_partner: &mut usize,
 ) -> Option<Contact> {
     let (of_a_world, of_b_world) = (&a.body.transform_world_map, &b.body.transform_world_map);
-    let (in_world, of_b) = b.in_world(index)?;
-    let in_a = of_a_world.inverse_transform_point(&in_world);
-    if !(*low <= in_a && in_a <= *high) {
-        return None;
-    }
-    let partner = a.body.walls.walls.nearest(&a.deformation.inverse(&in_a), reach)?.index;
+    let of_b = b.body.shape.corners[index]?;
+    let in_world = b.points[index];
+    let (points, order) = &a.index;
+    *last_partner = points.nearest_from(&in_world, reach, *last_partner)?.index;
+    let partner = order[*last_partner];
     let normal = of_a_world * a.body.walls.normals[partner];
     let cosine = normal.dot(&(of_b_world * b.body.walls.normals[index]));
     if !a.body.shape.seen[partner].fit(b.body.shape.seen[index], cosine) {
         return None;
     }
-    let place = a.body.walls.walls.points()[partner];
-    let (place_in_world, of_a) = a.in_world(partner)?;
+    let (place, point) = (a.body.walls.walls.points()[partner], b.body.walls.walls.points()[index]);
     Some(Contact {
-        of_a,
+        of_a: a.body.shape.corners[partner]?,
         of_b,
         partner: place,
         normal,
-        residual: normal.dot(&(in_world - place_in_world)),
+        residual: normal.dot(&(in_world - a.points[partner])),
         target: normal.dot(&(of_a_world * place - of_b_world * point)),
     })
 }
@@ -181,18 +214,17 @@ impl Contact {
         })
     }
 
-    /// Derivative of the distance of the point from the wall with respect to the moves of the nodes.
-    fn row(&self, a: DeformedBody<'_>, b: DeformedBody<'_>, point: &Point2) -> SVector<f64, UNKNOWNS> {
-        let mut row = SVector::<f64, UNKNOWNS>::zeros();
-        let ends = [(a, &self.of_a, &self.partner, -1.0), (b, &self.of_b, point, 1.0)];
-        for (end, (deformed, corners, point, sign)) in ends.into_iter().enumerate() {
+    /// Derivative of the distance of the point from the wall with respect to the move of each node.
+    fn row(&self, a: &DeformedBody<'_>, b: &DeformedBody<'_>, point: &Point2) -> [Vector3<f64>; NODES] {
+        let of_end = |deformed: &DeformedBody<'_>, corners: &Corners, point: &Point2, sign: f64| {
             let normal = deformed.body.transform_world_map.inverse_transform_vector(&self.normal).transpose();
-            for (place, &(node, weight)) in corners.iter().enumerate() {
+            corners.map(|(node, weight)| {
                 let arm = point - deformed.body.shape.lattice.position(node);
                 let by_node: RowVector3<f64> = normal * node_jacobian(&arm);
-                row.fixed_rows_mut::<3>(12 * end + 3 * place).copy_from(&(sign * weight * by_node).transpose());
-            }
-        }
-        row
+                (sign * weight * by_node).transpose()
+            })
+        };
+        let (of_a, of_b) = (of_end(a, &self.of_a, &self.partner, -1.0), of_end(b, &self.of_b, point, 1.0));
+        std::array::from_fn(|place| if place < 4 { of_a[place] } else { of_b[place - 4] })
     }
 }

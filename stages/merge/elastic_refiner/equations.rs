@@ -4,21 +4,37 @@ use super::ElasticRefinerParameters;
 use super::body::Body;
 use crate::shared::deformation::Deformation;
 use crate::shared::geometry::Point2;
-use crate::shared::sparse::{BlockCholesky, Columns, Dissection, SelectedInverse, factor};
+use crate::shared::sparse::{BlockCholesky, Columns, SelectedInverse, factor};
 use nalgebra::{Matrix3, Vector2, Vector3};
 use std::sync::Arc;
 
 /// Prior of the nodes about the rigid frames: standard deviations, metres and radians. They are far larger than the
 /// error of frames, so the prior only fixes what nothing else does, such as the pose of all maps together.
 const FRAME_DEVIATION: (f64, f64) = (0.5, 0.1);
-/// The same for a map that is not to be deformed: nearly zero.
-const KEPT_DEVIATION: (f64, f64) = (1e-5, 1e-6);
 
-/// Normal equations by node. The nodes of all bodies are numbered consecutively.
+/// The nodes of all bodies, numbered consecutively, and which of them are estimated.
+#[derive(Clone, Debug)]
+pub(super) struct Unknowns {
+    /// Place of each node in the elimination order. None for one whose move is given.
+    places: Vec<Option<usize>>,
+    /// Moves of the nodes that are given; of others any.
+    given: Vec<Vector3<f64>>,
+    /// Number of those that are estimated.
+    count: usize,
+}
+
+impl Unknowns {
+    /// Nodes with their places, and the moves of those without one.
+    pub(super) fn new(places: Vec<Option<usize>>, given: Vec<Vector3<f64>>) -> Self {
+        let count = places.iter().flatten().count();
+        Self { places, given, count }
+    }
+}
+
+/// Normal equations of the nodes that are estimated.
 #[derive(Clone, Debug)]
 pub(super) struct Equations {
-    /// Elimination order of the nodes.
-    pub(super) order: Arc<Dissection>,
+    pub(super) unknowns: Arc<Unknowns>,
     columns: Columns,
     vector: Vec<Vector3<f64>>,
 }
@@ -27,18 +43,21 @@ impl Equations {
     /// Prior on the deformations of the bodies, without walls.
     pub(super) fn of_deformations(
         bodies: &[Body<'_>],
-        order: &Arc<Dissection>,
+        unknowns: &Arc<Unknowns>,
         parameters: &ElasticRefinerParameters,
     ) -> Self {
-        let count = order.places.len();
-        let mut equations =
-            Self { order: Arc::clone(order), columns: vec![Vec::new(); count], vector: vec![Vector3::zeros(); count] };
+        let count = unknowns.count;
+        let mut equations = Self {
+            unknowns: Arc::clone(unknowns),
+            columns: vec![Vec::new(); count],
+            vector: vec![Vector3::zeros(); count],
+        };
+        let (shift, turn) = FRAME_DEVIATION;
+        let of_frame = Matrix3::from_diagonal(&Vector3::new(shift, shift, turn).map(|deviation| deviation.powi(-2)));
         let mut first = 0;
         for body in bodies {
-            let (shift, turn) = if body.is_kept { KEPT_DEVIATION } else { FRAME_DEVIATION };
-            let of_frame = Vector3::new(shift, shift, turn).map(|deviation| deviation.powi(-2));
             for node in first..first + body.shape.lattice.len() {
-                equations.add(node, node, || Matrix3::from_diagonal(&of_frame));
+                equations.add(node, node, &of_frame);
             }
             for (i, j) in body.shape.lattice.edges() {
                 let (at_i, at_j) = (body.shape.lattice.position(i), body.shape.lattice.position(j));
@@ -57,38 +76,44 @@ impl Equations {
         (j, at_j): (usize, Point2),
         parameters: &ElasticRefinerParameters,
     ) {
-        let edge = Edge::new(&(at_j - at_i), parameters);
-        for (row, by_row) in [(i, edge.by_i), (j, edge.by_j)] {
-            for (column, by_column) in [(i, edge.by_i), (j, edge.by_j)] {
-                self.add(row, column, || by_row.transpose() * edge.information * by_column);
-            }
-        }
+        let Edge { by_i, by_j, information } = Edge::new(&(at_j - at_i), parameters);
+        self.add(i, i, &(by_i.transpose() * information * by_i));
+        self.add(j, i, &(by_j.transpose() * information * by_i));
+        self.add(j, j, &(by_j.transpose() * information * by_j));
     }
 
-    /// Adds a block for two nodes. The matrix is symmetric, so blocks of two nodes are to be added in both orders.
-    pub(super) fn add(&mut self, row: usize, column: usize, block: impl FnOnce() -> Matrix3<f64>) {
-        let (row, column) = (self.order.places[row], self.order.places[column]);
-        if row >= column {
-            self.columns[column].push((row, block()));
+    /// Adds the block of a row and a column of two nodes, and its transpose for the column and the row. What it has
+    /// with the move of a node that is given goes to the right-hand side.
+    pub(super) fn add(&mut self, one: usize, other: usize, block: &Matrix3<f64>) {
+        let unknowns = &*self.unknowns;
+        match (unknowns.places[one], unknowns.places[other]) {
+            (Some(row), Some(column)) if row >= column => self.columns[column].push((row, *block)),
+            (Some(column), Some(row)) => self.columns[column].push((row, block.transpose())),
+            (Some(row), None) => self.vector[row] -= block * unknowns.given[other],
+            (None, Some(row)) => self.vector[row] -= block.tr_mul(&unknowns.given[one]),
+            (None, None) => {}
         }
     }
 
     pub(super) fn add_vector(&mut self, node: usize, part: &Vector3<f64>) {
-        self.vector[self.order.places[node]] += part;
+        if let Some(place) = self.unknowns.places[node] {
+            self.vector[place] += part;
+        }
     }
 
     /// Solves the equations. `None` if they have no solution.
     pub(super) fn solve(&self) -> Option<Solution> {
-        let factor = factor(&self.columns, &self.order.whole)?;
+        let factor = factor(&self.columns)?;
         let solved = factor.solve(&self.vector);
-        let moves = self.order.places.iter().map(|&place| solved[place]).collect();
+        let nodes = self.unknowns.places.iter().zip(&self.unknowns.given);
+        let moves = nodes.map(|(place, given)| place.map_or(*given, |place| solved[place])).collect();
         let explained = self.vector.iter().zip(&solved).map(|(part, by)| part.dot(by)).sum();
-        Some(Solution { moves, explained, order: Arc::clone(&self.order), factor })
+        Some(Solution { moves, explained, unknowns: Arc::clone(&self.unknowns), factor })
     }
 
     /// Logarithm of the determinant of the matrix. `None` if the equations have no solution.
     pub(super) fn log_determinant(&self) -> Option<f64> {
-        Some(factor(&self.columns, &self.order.whole)?.log_determinant())
+        Some(factor(&self.columns)?.log_determinant())
     }
 }
 
@@ -132,7 +157,7 @@ pub(super) struct Solution {
     pub(super) moves: Vec<Vector3<f64>>,
     /// Reduction of the sum of squares by the moves, in variances.
     pub(super) explained: f64,
-    order: Arc<Dissection>,
+    unknowns: Arc<Unknowns>,
     factor: BlockCholesky,
 }
 
@@ -144,19 +169,20 @@ impl Solution {
 
     /// Covariances of the nodes.
     pub(super) fn covariances(&self) -> Covariances<'_> {
-        Covariances { places: &self.order.places, inverse: self.factor.selected_inverse() }
+        Covariances { places: &self.unknowns.places, inverse: self.factor.selected_inverse() }
     }
 }
 
 /// Covariances of nodes, and of neighbouring nodes with each other.
 pub(super) struct Covariances<'a> {
-    places: &'a [usize],
+    places: &'a [Option<usize>],
     inverse: SelectedInverse<'a>,
 }
 
 impl Covariances<'_> {
-    /// Covariance of the moves of two nodes, equal or neighbouring.
+    /// Covariance of the moves of two nodes, equal or neighbouring. Zeros where one of them is given.
     pub(super) fn of(&self, one: usize, other: usize) -> Matrix3<f64> {
-        self.inverse.at(self.places[one], self.places[other])
+        let places = self.places[one].zip(self.places[other]);
+        places.map_or_else(Matrix3::zeros, |(one, other)| self.inverse.at(one, other))
     }
 }

@@ -2,22 +2,12 @@
 
 use super::ElasticRefinerParameters;
 use super::body::Body;
-use super::contacts::Contacts;
 use super::equations::{Equations, Solution};
+use super::rounds::Round;
 
 /// Where maps are deformed little, the prior is too wide to be likely. So smaller deformations are tried as well,
 /// with this share of the standard deviations.
 const LITTLE: f64 = 0.25;
-
-/// Result of one round.
-pub(super) struct Round {
-    /// Contacts of the walls, for each pair of maps.
-    pub(super) walls: Vec<Contacts>,
-    /// The prior, without walls.
-    pub(super) of_deformations: Equations,
-    /// The solution of both.
-    pub(super) solution: Solution,
-}
 
 /// Logarithm of the evidence ratio of deformed to rigid maps, for two linear models (MacKay 1992, "Bayesian
 /// interpolation"), with the prior of `parameters` or a narrower one, whichever is likelier. Above 0 the deformation
@@ -34,7 +24,7 @@ pub(super) fn gain(bodies: &[Body<'_>], last: &Round, parameters: &ElasticRefine
     if best <= 0.0 {
         let little =
             ElasticRefinerParameters { bend: LITTLE * parameters.bend, turn: LITTLE * parameters.turn, ..*parameters };
-        let of_deformations = Equations::of_deformations(bodies, &last.of_deformations.order, &little);
+        let of_deformations = Equations::of_deformations(bodies, &last.of_deformations.unknowns, &little);
         let mut equations = of_deformations.clone();
         last.walls.iter().for_each(|contacts| contacts.add_to(&mut equations));
         best = best.max(log_ratio(&of_deformations, &equations.solve()?)?);

@@ -27,6 +27,7 @@ mod equations;
 mod evidence;
 mod parameters;
 mod refine;
+mod rounds;
 mod sharpness;
 mod stage;
 #[cfg(test)]
@@ -35,7 +36,7 @@ mod tests;
 pub use body::Body;
 pub use drift::Drift;
 pub use parameters::ElasticRefinerParameters;
-pub use refine::{RefinedMap, Refinement, refine};
+pub use refine::{RefinedMap, Refinement, deform_onto, refine};
 pub use sharpness::sharpness;
 
 use gridweave_runtime::stage::StageKind;

@@ -37,11 +37,12 @@ pub fn sharpness(
     maps: &[RefinedMap],
     parameters: &ElasticRefinerParameters,
 ) -> Vec<[Sharpness; 2]> {
-    let deformed = |body: usize| DeformedBody { body: &bodies[body], deformation: &maps[body].deformation, first: 0 };
+    let deformed = bodies.iter().zip(maps).map(|(body, map)| DeformedBody::new(body, map.deformation.clone(), 0));
+    let deformed: Vec<DeformedBody<'_>> = deformed.collect();
     let of_body = |b: usize| {
         let (mut rigid, mut as_deformed) = (Sum::default(), Sum::default());
         for a in (0..bodies.len()).filter(|a| *a != b) {
-            let (length, found) = apart(deformed(a), deformed(b), SAME_WALL.min(parameters.reach));
+            let (length, found) = apart(&deformed[a], &deformed[b], SAME_WALL.min(parameters.reach));
             for at in found {
                 rigid.add(length, at.rigid);
                 as_deformed.add(length, at.deformed);

@@ -3,11 +3,13 @@
 
 use super::anchor::anchor;
 use super::{Body, ElasticRefinerParameters, RefinedMap, refine, sharpness};
-use crate::shared::deformation::Lattice;
+use crate::shared::deformation::{Deformation, Lattice};
 use crate::shared::geometry::row_by_row;
 use crate::shared::robot_maps::{RobotMap, RobotMaps};
 use crate::shared::walls::{NORMAL_RADIUS, WallsOnDemand};
-use gridweave_runtime::ros::{DeformationNode, Header, MapDeformation, OccupancyGrid, RobotFrames, Sharpness};
+use gridweave_runtime::ros::{
+    DeformationNode, Header, MapDeformation, OccupancyGrid, RobotFrame, RobotFrames, Sharpness,
+};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 use std::collections::BTreeMap;
 
@@ -38,17 +40,21 @@ pub(super) struct ElasticRefiner {
     deformed_frames: RobotFrames,
     /// Maps at the latest refinement, by robot.
     deformed_maps: BTreeMap<String, DeformedMap>,
+    /// Whether the latest refinement started from that before it.
+    started_from_known: bool,
     /// Whether any deformation was sent.
     has_sent: bool,
 }
 
 /// A map at its latest refinement.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 struct DeformedMap {
     /// Number of the map among those of its robot.
     number: u64,
     /// Number of nodes of its lattice.
     nodes: usize,
+    /// Its deformation; none if it was not estimated.
+    deformation: Option<Deformation>,
 }
 
 impl ElasticRefiner {
@@ -59,6 +65,7 @@ impl ElasticRefiner {
             frames: RobotFrames::default(),
             deformed_frames: RobotFrames::default(),
             deformed_maps: BTreeMap::new(),
+            started_from_known: false,
             has_sent: false,
         }
     }
@@ -81,14 +88,15 @@ impl ElasticRefiner {
     ) -> Result<(), StageError> {
         self.frames = frames.into_content();
         // Small changes wait for the end: deformations are in the map's own frame, and hold for a frame nearby.
-        if self.is_near() { output.frames.send("", &self.frames) } else { self.deform(output) }
+        if self.is_near() { output.frames.send("", &self.frames) } else { self.deform(true, output) }
     }
 
+    /// The last deformations depend on the last maps and frames only, and not on those before.
     pub(super) fn finish(&mut self, output: &Output<Deformations>) -> Result<(), StageError> {
         let numbers = self.deformed_maps.iter().map(|(robot, map)| (robot, map.number));
         let is_deformed = self.frames.frames == self.deformed_frames.frames
             && self.placed().map(|(robot, map)| (robot, map.number)).eq(numbers);
-        if is_deformed { Ok(()) } else { self.deform(output) }
+        if is_deformed && !self.started_from_known { Ok(()) } else { self.deform(false, output) }
     }
 
     /// Whether the robots are near their frames of the latest refinement, and their maps have grown little.
@@ -117,15 +125,27 @@ impl ElasticRefiner {
         placed.into_iter()
     }
 
-    fn deform(&mut self, output: &Output<Deformations>) -> Result<(), StageError> {
-        self.deformed_frames = self.frames.clone();
-        let spacing = self.parameters.spacing;
-        let of_map = |(robot, map): (&String, &RobotMap<WallsOnDemand>)| {
-            (robot.clone(), DeformedMap { number: map.number, nodes: Lattice::over(&map.grid(), spacing).len() })
-        };
-        self.deformed_maps = self.placed().map(of_map).collect();
+    /// The deformation of a map as it was estimated before, if the map is the same and its frame nearly so.
+    fn known(&self, frame: &RobotFrame, map: &RobotMap<WallsOnDemand>) -> Option<Deformation> {
+        let ElasticRefinerParameters { min_move, min_turn, .. } = self.parameters;
+        let before = self.deformed_frames.frames.iter().find(|before| before.robot == frame.robot)?;
+        let deformed = self.deformed_maps.get(&frame.robot).filter(|deformed| deformed.number == map.number)?;
+        let is_near =
+            self.deformed_frames.reference == self.frames.reference && before.is_near(frame, min_move, min_turn);
+        deformed.deformation.clone().filter(|_| is_near)
+    }
+
+    /// Estimates the deformations of all placed maps; if `from_known`, those of new maps first, if they are few.
+    fn deform(&mut self, from_known: bool, output: &Output<Deformations>) -> Result<(), StageError> {
         let frames = self.frames.frames.iter();
         let placed: Vec<_> = frames.filter_map(|frame| Some((frame, self.maps.get(&frame.robot)?))).collect();
+        let spacing = self.parameters.spacing;
+        let of_map = |(frame, map): &(&RobotFrame, &RobotMap<WallsOnDemand>)| {
+            let nodes = Lattice::over(&map.grid(), spacing).len();
+            (frame.robot.clone(), DeformedMap { number: map.number, nodes, deformation: None })
+        };
+        let mut deformed_maps: BTreeMap<String, DeformedMap> = placed.iter().map(of_map).collect();
+        let mut started_from_known = false;
         // A single map is not deformed; that is sent if it was deformed before.
         let has_news = placed.len() > 1 || self.has_sent;
         if self.parameters.enabled && has_news {
@@ -134,13 +154,19 @@ impl ElasticRefiner {
                 .iter()
                 .map(|(frame, map)| {
                     let (grid, walls) = (map.grid(), map.walls(NORMAL_RADIUS));
-                    let body = Body::new(&grid, walls, frame.transform_reference_robot(), self.parameters.spacing);
-                    let is_kept = self.parameters.keep_reference && frame.robot == self.frames.reference;
-                    if is_kept { body.kept() } else { body }
+                    let body = Body::new(&grid, walls, frame.transform_reference_robot(), spacing);
+                    if self.parameters.keep_reference && frame.robot == self.frames.reference {
+                        return body.kept();
+                    }
+                    match self.known(frame, map).filter(|_| from_known) {
+                        Some(known) => body.deformed(known),
+                        None => body,
+                    }
                 })
                 .collect();
             match refine(&bodies, &self.parameters) {
                 Some(refinement) => {
+                    started_from_known = refinement.started_from_known;
                     let mut refined = refinement.if_supported();
                     let reference = placed.iter().position(|(frame, _)| frame.robot == self.frames.reference);
                     reference.into_iter().for_each(|reference| anchor(&mut refined, &bodies, reference));
@@ -148,6 +174,9 @@ impl ElasticRefiner {
                     for (((frame, map), refined), sharpness) in placed.iter().zip(&refined).zip(sharpness) {
                         let header = Header::new(output.log_time(), map.frame_id.clone());
                         output.deformation.send(&frame.robot, &message(header, &frame.robot, refined, sharpness))?;
+                        if let Some(deformed) = deformed_maps.get_mut(&frame.robot) {
+                            deformed.deformation = Some(refined.deformation.clone());
+                        }
                     }
                 }
                 None => output.warn(
@@ -155,6 +184,9 @@ impl ElasticRefiner {
                 ),
             }
         }
+        self.started_from_known = started_from_known;
+        self.deformed_frames = self.frames.clone();
+        self.deformed_maps = deformed_maps;
         output.frames.send("", &self.frames)
     }
 }

@@ -66,7 +66,7 @@ fn a_deformed_map_is_aligned_with_a_straight_one() {
                 drift: None,
             })
             .collect();
-        let Refinement { maps: refined, gain } = refine(&bodies, &PARAMETERS()).unwrap();
+        let Refinement { maps: refined, gain, .. } = refine(&bodies, &PARAMETERS()).unwrap();
         assert!(gain > 10.0, "{most}: {gain}");
         let (before, after) = (apart(&rigid, &bodies, most, &places()), apart(&refined, &bodies, most, &places()));
         assert!(before.1 > 0.9 * most, "{before:?}");
@@ -215,6 +215,46 @@ fn bends_are_sent_before_the_frames_that_they_belong_to_and_again_when_a_map_has
         deformations.iter().flat_map(|deformation| &deformation.nodes).all(|node| node.dx.hypot(node.dy) < 0.01),
         "it is straight by then"
     );
+}
+
+#[test]
+fn a_map_that_comes_last_is_aligned_as_if_all_had_come_at_once() {
+    let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
+    let deformed = |most: f64| map.deformed(most).cells;
+    let maps = [map.cells.clone(), deformed(0.2), deformed(-0.25), deformed(0.3)];
+    let names = ["robot1", "robot2", "robot3", "robot4"];
+    let frame = |robot: &&str| RobotFrame { robot: (*robot).to_owned(), ..Default::default() };
+    let frames_of = |count: usize| RobotFrames {
+        reference: "robot1".into(),
+        frames: names[..count].iter().map(frame).collect(),
+        ..Default::default()
+    };
+    // One stage gets the last robot after it has deformed the others, one gets all at once.
+    let [late, at_once] = [[3, 4], [4, 4]].map(|counts| {
+        let mut stage = StageHarness::new(&kind(), "").unwrap();
+        for (name, cells) in names.iter().zip(&maps) {
+            let data: Vec<u8> = cells.iter().map(|cell| *cell as u8).collect();
+            let header = Header { frame_id: format!("{name}/map"), ..Default::default() };
+            let message = OccupancyGrid { header, info: map.info(), data: &data };
+            stage.give::<OccupancyGrid<'_>>("map", name, LogTime(1), &message).unwrap();
+        }
+        for count in counts {
+            stage.take::<MapDeformation>("deformation").unwrap();
+            stage.give::<RobotFrames>("frames", "", LogTime(2), &frames_of(count)).unwrap();
+        }
+        let while_it_runs: Vec<MapDeformation> = stage.take("deformation").unwrap();
+        stage.finish(LogTime(3)).unwrap();
+        (while_it_runs, stage.take::<MapDeformation>("deformation").unwrap())
+    });
+    let (from_known, at_the_end) = late;
+    assert_eq!((from_known.len(), at_the_end.len()), (4, 4), "it starts again at the end");
+    assert!(at_once.0.is_empty() && at_once.1.is_empty(), "nothing has changed since");
+    for (one, other) in from_known.iter().zip(&at_the_end) {
+        assert!(one.sharpness.apart < 0.03 && one.sharpness.doubled < 0.03, "{:?}", one.sharpness);
+        let pairs = one.nodes.iter().zip(&other.nodes);
+        let apart = pairs.map(|(one, other)| (one.dx - other.dx).hypot(one.dy - other.dy)).fold(0.0, f64::max);
+        assert!(apart > 0.0 && apart < 0.05, "{}: {apart}", one.robot);
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use super::ComparisonParameters;
 use super::agreement::{Agreement, MapView, compare};
-use crate::merge::elastic_refiner::{Body, ElasticRefinerParameters, refine};
+use crate::merge::elastic_refiner::{Body, ElasticRefinerParameters, deform_onto};
 use crate::shared::deformation::Deformation;
 use crate::shared::geometry::{Point2, PointPair, Pose2, RigidFit, covariance_about, fit_rigid, is_known};
 use crate::shared::walls::{WallMap, stride};
@@ -48,17 +48,16 @@ impl Deformed {
             turn: SQRT_2 * parameters.turn,
             ..Default::default()
         };
-        let bodies = [body_a.clone().kept(), body_b.at(*transform_a_b)];
-        let refined = refine(&bodies, &elastic)?.maps.pop()?;
-        let walls = b.walls.deformed(&refined.deformation);
-        let deformed = MapView { grid: b.grid, walls: &walls, deformation: Some(&refined.deformation) };
-        let (nearest, scale) = nearest_rigid(a, b.walls, transform_a_b, &refined.deformation)?;
+        let (deformation, cost) = deform_onto(body_a, &body_b.at(*transform_a_b), &elastic)?;
+        let walls = b.walls.deformed(&deformation);
+        let deformed = MapView { grid: b.grid, walls: &walls, deformation: Some(&deformation) };
+        let (nearest, scale) = nearest_rigid(a, b.walls, transform_a_b, &deformation)?;
         Some(Self {
             transform_a_b: nearest.transform_a_b,
             covariance: nearest.covariance,
             rms: nearest.rms,
             scale,
-            cost: refined.cost,
+            cost,
             agreement: compare(a, &deformed, transform_a_b, parameters),
         })
     }

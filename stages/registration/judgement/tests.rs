@@ -101,6 +101,11 @@ fn a_deformed_map_is_compared_with_its_deformation_and_its_pose_is_the_nearest_r
     assert!(reason(&verdict).contains("with a deformation of 0.4"), "{}", reason(&verdict));
     let deformed = verdict.candidate.deformed.unwrap();
     assert!(deformed.agreement.inlier_ratio() > 0.95 && deformed.cost > 1.0, "{deformed:?}");
+    for (allowed, is_refused) in [(deformed.rms - 0.006, true), (deformed.rms - 0.004, false)] {
+        let parameters = JudgementParameters { max_bend: allowed, ..Default::default() };
+        let verdict = judge(&a.view(), &b.view(), &maps, &UserKnowledge::default(), &parameters).unwrap();
+        assert_eq!(verdict.refusal.is_some(), is_refused, "{allowed}: {}", reason(&verdict));
+    }
     let poses: Vec<Point2> =
         (1..20).flat_map(|x| (1..12).map(move |y| Point2::new(f64::from(x), f64::from(y)))).collect();
     let off = poses.iter().map(|place| deformed.transform_a_b * (place + deformation_at(MOST, place)) - place);

@@ -1,47 +1,20 @@
 //! Elimination order of the nodes of all maps.
 
 use crate::shared::geometry::Point2;
-use std::ops::Range;
 
 /// Sets of fewer nodes are not divided any further.
 const LEAST_NODES: usize = 16;
 
-/// Elimination order of nodes, and its independent parts.
-#[derive(Clone, Debug)]
-pub(crate) struct Dissection {
-    /// Position of each node in the order.
-    pub(crate) places: Vec<usize>,
-    /// The whole order.
-    pub(crate) whole: Part,
-}
-
-/// A contiguous part of the order.
-#[derive(Clone, Debug)]
-pub(crate) struct Part {
-    /// Positions of all its nodes.
-    pub(crate) places: Range<usize>,
-    /// Two parts without a common equation, at its beginning; the rest separates them. None if it is not divided.
-    pub(crate) sides: Option<Box<[Part; 2]>>,
-}
-
-impl Part {
-    /// A part that is not divided.
-    pub(crate) fn undivided(places: Range<usize>) -> Self {
-        Self { places, sides: None }
-    }
-}
-
-impl Dissection {
-    /// Computes an order with a sparse factor: the nodes on one side of a line, those on the other, and last those of
-    /// one side with equations to the other; and so on within each side (nested dissection, George 1973, by the
-    /// positions of the nodes). `neighbours` are for each node those with a common equation.
-    pub(crate) fn new(at: &[Point2], neighbours: &[Vec<usize>]) -> Self {
-        let mut division = Division { at, neighbours, side_of: vec![0; at.len()], sides: 0, order: Vec::new() };
-        let whole = division.divide((0..at.len()).collect());
-        let mut places = vec![0; at.len()];
-        division.order.into_iter().enumerate().for_each(|(place, node)| places[node] = place);
-        Self { places, whole }
-    }
+/// Computes the position of each node in an elimination order with a sparse factor: the nodes on one side of a line,
+/// those on the other, and last those of one side with equations to the other; and so on within each side (nested
+/// dissection, George 1973, by the positions of the nodes). `neighbours` are for each node those with a common
+/// equation.
+pub(crate) fn nested_dissection(at: &[Point2], neighbours: &[Vec<usize>]) -> Vec<usize> {
+    let mut division = Division { at, neighbours, side_of: vec![0; at.len()], sides: 0, order: Vec::new() };
+    division.divide((0..at.len()).collect());
+    let mut places = vec![0; at.len()];
+    division.order.into_iter().enumerate().for_each(|(place, node)| places[node] = place);
+    places
 }
 
 /// State while nodes are ordered.
@@ -56,22 +29,21 @@ struct Division<'a> {
 
 impl Division<'_> {
     /// Appends nodes to the order. The number halves each time, so the recursion is as deep as its number of bits.
-    fn divide(&mut self, mut nodes: Vec<usize>) -> Part {
-        let first = self.order.len();
+    fn divide(&mut self, mut nodes: Vec<usize>) {
         sort_along(&mut nodes, self.at);
         if nodes.len() <= LEAST_NODES {
             self.order.extend(nodes);
-            return Part::undivided(first..self.order.len());
+            return;
         }
         let high = nodes.split_off(nodes.len() / 2);
         self.sides += 1;
         high.iter().for_each(|&node| self.side_of[node] = self.sides);
         let borders = |node: &usize| self.neighbours[*node].iter().any(|&other| self.side_of[other] == self.sides);
         let (mut border, low): (Vec<usize>, Vec<usize>) = nodes.into_iter().partition(borders);
-        let sides = Some(Box::new([self.divide(low), self.divide(high)]));
+        self.divide(low);
+        self.divide(high);
         sort_along(&mut border, self.at);
         self.order.extend(border);
-        Part { places: first..self.order.len(), sides }
     }
 }
 
@@ -100,7 +72,7 @@ mod tests {
         let is_near = |one: usize, other: usize| (places[one] - places[other]).norm() < 1.1 && one != other;
         let neighbours: Vec<Vec<usize>> =
             (0..32).map(|one| (0..32).filter(|&other| is_near(one, other)).collect()).collect();
-        let Dissection { places: order, whole } = Dissection::new(&places, &neighbours);
+        let order = nested_dissection(&places, &neighbours);
         let mut all = order.clone();
         all.sort_unstable();
         assert_eq!(all, (0..32).collect::<Vec<_>>(), "each node once");
@@ -108,8 +80,6 @@ mod tests {
         let low = |node: &usize| order[*node] < 12;
         assert!((0..32).filter(separates).all(|node| places[node].x == 3.0), "{order:?}");
         assert!((0..32).filter(low).all(|node| places[node].x < 3.0), "{order:?}");
-        let [low, high] = &*whole.sides.expect("it is divided");
-        assert_eq!((low.places.clone(), high.places.clone(), whole.places), (0..12, 12..28, 0..32));
-        assert!(Dissection::new(&[], &[]).places.is_empty());
+        assert!(nested_dissection(&[], &[]).is_empty());
     }
 }

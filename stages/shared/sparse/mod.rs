@@ -1,12 +1,25 @@
 //! Direct solution of sparse symmetric systems of blocks of 3 x 3: those of poses and of nodes of a deformation.
 //!
-//! [`Dissection`] orders the unknowns, [`factor`] computes the Cholesky factor in that order, and [`BlockCholesky`]
-//! solves with it and computes the parts of the inverse that are needed.
+//! [`nested_dissection`] orders the unknowns, [`factor`] computes the Cholesky factor in that order, and [`BlockCholesky`]
+//! solves with it and computes the parts of the inverse that are needed. Arithmetic is done on dense parts, the fronts
+//! of an assembly tree.
 
+mod assembly_tree;
 mod block_cholesky;
+mod block_column;
 mod dissection;
 mod factoring;
+mod selected_inverse;
+#[cfg(test)]
+mod tests;
 
-pub(crate) use block_cholesky::{BlockCholesky, SelectedInverse};
-pub(crate) use dissection::{Dissection, Part};
-pub(crate) use factoring::{Columns, factor};
+pub(crate) use block_cholesky::BlockCholesky;
+pub(crate) use dissection::nested_dissection;
+pub(crate) use factoring::factor;
+pub(crate) use selected_inverse::SelectedInverse;
+
+use nalgebra::Matrix3;
+
+/// Lower triangle of a symmetric matrix by columns: the entries of each in any order, and several for one position,
+/// which are summed.
+pub(crate) type Columns = Vec<Vec<(usize, Matrix3<f64>)>>;

@@ -7,7 +7,7 @@ use super::keyframes::{KeyframeReading, Keyframes};
 use super::residuals::ReadingFactor;
 use super::step::{OdometryDrift, Systematic};
 use crate::shared::geometry::{Point2, Pose2, relative_pose};
-use crate::shared::sparse::{BlockCholesky, Columns, Part, factor};
+use crate::shared::sparse::{BlockCholesky, Columns, factor};
 use nalgebra::{DMatrix, Matrix2, Matrix3, UnitComplex, Vector2, Vector3};
 
 /// Largest number of steps to an optimum.
@@ -269,7 +269,7 @@ impl<'a> LandmarkGraph<'a> {
     }
 
     fn factor(&self) -> Option<BlockCholesky> {
-        factor(&self.equations().columns, &Part::undivided(0..self.poses.len() + self.tags.len() + 2))
+        factor(&self.equations().columns)
     }
 
     /// Logarithm of the probability of all readings and steps under the assumed drift, whatever the poses and the tags
@@ -316,7 +316,7 @@ impl LandmarkEquations {
                 }
             }
         }
-        let moves = factor(&columns, &Part::undivided(0..columns.len()))?.solve(&self.right);
+        let moves = factor(&columns)?.solve(&self.right);
         moves.iter().all(|step| step.iter().all(|value| value.is_finite())).then_some(moves)
     }
 }
