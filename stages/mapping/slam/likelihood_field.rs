@@ -51,12 +51,10 @@ impl LikelihoodField {
         if columns.is_empty() || rows.is_empty() {
             return;
         }
-        let mut by_column = [0.0; SIDE];
-        for (value, column) in by_column.iter_mut().zip(columns.clone()) {
-            *value = 255.0 * likelihood(column as f64 + 0.5 - at.x);
-        }
-        for row in rows {
-            let by_row = likelihood(row as f64 + 0.5 - at.y);
+        let by_column = likelihoods(columns.start as f64 + 0.5 - at.x);
+        let by_column = by_column.map(|likelihood| 255.0 * likelihood);
+        let by_row = likelihoods(rows.start as f64 + 0.5 - at.y);
+        for (row, by_row) in rows.zip(by_row) {
             let start = row * self.width;
             let of_row = &mut cells[start + columns.start..start + columns.end];
             for (cell, by_column) in of_row.iter_mut().zip(&by_column) {
@@ -113,9 +111,19 @@ fn around(at: f64, count: usize) -> Range<usize> {
     bounded(cell.saturating_sub(REACH))..bounded(cell.saturating_add(REACH + 1))
 }
 
-/// The likelihood of a point at a distance of so many cells along an axis.
-fn likelihood(cells: f64) -> f64 {
-    (-0.5 * (cells * CELL / DEVIATION).powi(2)).exp()
+/// The likelihoods of a point in neighbouring cells along an axis, the first of which is at a distance of so many cells.
+/// Neighbouring values of a Gaussian have a ratio, which changes by the same factor from each to the next.
+fn likelihoods(cells: f64) -> [f64; SIDE] {
+    const SCALE: f64 = -0.5 * (CELL / DEVIATION) * (CELL / DEVIATION);
+    let mut value = (SCALE * cells * cells).exp();
+    let mut ratio = (SCALE * (2.0 * cells + 1.0)).exp();
+    let change = (2.0 * SCALE).exp();
+    std::array::from_fn(|_| {
+        let own = value;
+        value *= ratio;
+        ratio *= change;
+        own
+    })
 }
 
 #[cfg(test)]

@@ -12,7 +12,10 @@ const SURFACE_CELL: f64 = 0.1;
 /// Sectors of directions.
 const SECTORS: f64 = 12.0;
 /// Distances within which a point is matched with a surface, metres: from the search's cells down to the noise.
-const RADII: [f64; 6] = [0.3, 0.25, 0.2, 0.15, 0.15, 0.15];
+const RADII: [f64; 6] = [0.3, 0.25, 0.2, LAST_RADIUS, LAST_RADIUS, LAST_RADIUS];
+const LAST_RADIUS: f64 = 0.15;
+/// Steps at the last radius that are shorter end the iteration, metres and radians.
+const LEAST_STEP: f64 = 1e-4;
 /// Standard deviation in the weight of a match, as a share of the radius (Welsch).
 const WEIGHT_WIDTH: f64 = 0.5;
 
@@ -48,7 +51,9 @@ impl LocalMap {
     /// Makes a map of scans at their poses.
     pub fn new<'a>(scans: impl Iterator<Item = (Pose2, &'a [ScanPoint])>) -> Self {
         let mut points = Vec::new();
-        let mut keyed: Vec<([i32; 3], Surface)> = Vec::new();
+        let mut pieces: Vec<Surface> = Vec::new();
+        // For each piece its cell and sector, and its number.
+        let mut keyed: Vec<(u64, u32)> = Vec::new();
         let mut spots: Vec<Point2> = Vec::new();
         for (pose, scan) in scans {
             for point in scan {
@@ -59,17 +64,17 @@ impl LocalMap {
                     continue;
                 };
                 let normal = pose * normal;
-                let sector = (normal.y.atan2(normal.x) / TAU * SECTORS).floor() as i32;
-                let cell = (place / SURFACE_CELL).map(f64::floor);
-                keyed.push(([cell.x as i32, cell.y as i32, sector], Surface { place, normal }));
+                keyed.push((key(&place, &normal), pieces.len() as u32));
+                pieces.push(Surface { place, normal });
             }
         }
-        // A stable sort: the order of the sums is that of the scans.
-        keyed.sort_by_key(|(key, _)| *key);
-        let mean = |group: &[([i32; 3], Surface)]| {
+        // The order of the sums is that of the scans, as the numbers are sorted, too.
+        keyed.sort_unstable();
+        let mean = |group: &[(u64, u32)]| {
             let share = 1.0 / group.len() as f64;
-            let place = group.iter().map(|(_, surface)| surface.place.coords * share).sum::<Vector2<f64>>();
-            let normal = group.iter().map(|(_, surface)| surface.normal).sum::<Vector2<f64>>();
+            let group = || group.iter().map(|(_, number)| &pieces[*number as usize]);
+            let place = group().map(|surface| surface.place.coords * share).sum::<Vector2<f64>>();
+            let normal = group().map(|surface| surface.normal).sum::<Vector2<f64>>();
             Surface { place: place.into(), normal: normal.normalize() }
         };
         let unsorted: Vec<Surface> = keyed.chunk_by(|(a, _), (b, _)| a == b).map(mean).collect();
@@ -108,8 +113,11 @@ impl LocalMap {
             let Some(step) = matrix.cholesky().map(|factor| factor.solve(&vector)) else { break };
             pose.translation.vector += step.xy();
             pose.rotation *= nalgebra::UnitComplex::new(step.z);
+            if radius == LAST_RADIUS && step.norm() < LEAST_STEP {
+                break;
+            }
         }
-        let (information, _, matched) = self.equations(scan, &pose, RADII[RADII.len() - 1], &mut nearest);
+        let (information, _, matched) = self.equations(scan, &pose, LAST_RADIUS, &mut nearest);
         Match { pose, information, matched }
     }
 
@@ -158,6 +166,15 @@ impl LocalMap {
         }
         (matrix, vector, f64::from(matched) / scan.len().max(1) as f64)
     }
+}
+
+/// The cell of a place and the sector of a direction, as one number.
+fn key(place: &Point2, normal: &Vector2<f64>) -> u64 {
+    // Within half of what 30 bits hold, which is 50,000 km.
+    const MIDDLE: f64 = (1_u64 << 29) as f64;
+    let cell = |coordinate: f64| ((coordinate / SURFACE_CELL).floor() + MIDDLE).clamp(0.0, 2.0 * MIDDLE - 1.0) as u64;
+    let sector = (normal.y.atan2(normal.x) / TAU * SECTORS + SECTORS / 2.0).floor() as u64;
+    (cell(place.x) << 34) | (cell(place.y) << 4) | sector
 }
 
 #[cfg(test)]

@@ -11,6 +11,9 @@
 //!   and the map is locally rigid;
 //! - frames: a wide prior keeps the maps near their rigid frames.
 //!
+//! Where most maps were deformed before, the new ones are first aligned with these as they are, and the last rounds
+//! estimate all together.
+//!
 //! Maps stay rigid where that is likelier than a deformation: where the noise of cells explains the walls as well.
 //!
 //! Nodes that are rigid pieces connected by drift are the submaps of Atlas (Bosse et al. 2004) and Cartographer (Hess
@@ -49,8 +52,8 @@ pub fn kind() -> StageKind {
         "Deforms the maps of all placed robots, so that walls that several have seen are aligned; maps stay rigid where \
          that is likelier. It sends for each robot a lattice of small displacements and turns with their covariances, and the \
          sharpness of its walls; the rigid frames stay as they are. Deformations are estimated when other robots are placed, when a \
-         frame has changed by more than `min_move` or `min_turn` or a map has grown by more than `min_growth`, and at the end if \
-         anything has changed since.",
+         frame has changed by more than `min_move` or `min_turn` or a map has grown by more than `min_growth`. Where only few maps \
+         are new, these are first aligned with the others. At the end all are estimated from scratch, if that was not done before.",
         |parameters: ElasticRefinerParameters, _| Ok(ElasticRefiner::new(parameters)),
     )
     .input("map", "The robots' maps.", ElasticRefiner::receive_map)
