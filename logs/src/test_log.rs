@@ -47,6 +47,14 @@ impl TestLog {
         self
     }
 
+    /// Adds a chunk without messages.
+    pub(crate) fn empty_chunk(&mut self) -> &mut Self {
+        self.flush();
+        let schema = self.writer.add_schema("p/msg/Silent", "ros2msg", b"").unwrap();
+        self.writer.add_channel(schema, "/silent", "cdr", &BTreeMap::new()).unwrap();
+        self.flush()
+    }
+
     /// Adds a ROS message.
     pub(crate) fn add(&mut self, topic: &str, type_name: &str, time: u64, message: &impl Serialize) -> &mut Self {
         self.raw(topic, type_name, time, &encode(message).unwrap())

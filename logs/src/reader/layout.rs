@@ -64,13 +64,20 @@ impl Layout {
     fn survey(&mut self, file: &FileBytes, unsure: &[bool]) {
         let blocks: Vec<_> = std::mem::take(&mut self.blocks).into_iter().zip(unsure.iter().copied()).collect();
         let mut rest = blocks.as_slice();
+        // The number of each block among those that are kept.
+        let mut numbers = Vec::with_capacity(blocks.len());
         while !rest.is_empty() {
             let (batch, later) = rest.split_at(surveyed_together(rest));
             rest = later;
             let surveys: Vec<_> = batch.par_iter().map(|(block, unsure)| unsure.then(|| block.survey(file))).collect();
             for ((block, _), survey) in batch.iter().zip(surveys) {
+                let number = self.blocks.len();
                 self.add_surveyed(block.clone(), survey);
+                numbers.push((self.blocks.len() > number).then_some(number));
             }
+        }
+        for channel in self.index.values_mut() {
+            channel.blocks = channel.blocks.iter().filter_map(|block| *numbers.get(*block)?).collect();
         }
     }
 

@@ -42,6 +42,20 @@ fn a_lidar_is_mounted_from_the_beginning_of_the_log_wherever_its_mount_was_logge
 }
 
 #[test]
+fn chunks_without_messages_do_not_hide_a_mount() {
+    for options in layouts() {
+        let folder = Folder::new();
+        let mut log = TestLog::new(options);
+        log.empty_chunk()
+            .add("/robot1/scan", LaserScan::NAME, 1, &scan())
+            .flush()
+            .add("/tf_static", TFMessage::NAME, 2, &placed("robot1/base_link", "robot1/laser", 0.2))
+            .add("/robot1/scan", LaserScan::NAME, 3, &scan());
+        assert_eq!(lidar_places(vec![folder.write("a.mcap", &log.finish())], ""), [0.2, 0.2]);
+    }
+}
+
+#[test]
 fn a_mount_that_is_sent_again_and_again_holds_before_it_is_first_sent() {
     let (_folder, files) = write(|log| {
         log.add("/robot1/scan", LaserScan::NAME, 1, &scan())
