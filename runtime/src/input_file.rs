@@ -42,16 +42,30 @@ pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     }
 }
 
-/// Reads a whole text of at most [`LONGEST_TEXT`] bytes.
+/// Reads a whole text of at most [`LONGEST_TEXT`] bytes: UTF-8, or UTF-16 with a byte order mark, as some editors write it.
 ///
 /// # Errors
-/// As [`read`]; or it is not UTF-8.
+/// As [`read`]; or it is not such text.
 pub fn read_text(path: &Path) -> io::Result<String> {
-    let text = String::from_utf8(read(path, LONGEST_TEXT)?);
-    text.map_err(|error| {
-        let byte = error.utf8_error().valid_up_to();
-        io::Error::new(ErrorKind::InvalidData, format!("byte {byte} is not UTF-8 text"))
-    })
+    let bytes = read(path, LONGEST_TEXT)?;
+    let wrong = |text: String| io::Error::new(ErrorKind::InvalidData, text);
+    let utf_16 = match bytes.as_slice() {
+        [0xff, 0xfe, text @ ..] => Some(of_utf_16(text, u16::from_le_bytes)),
+        [0xfe, 0xff, text @ ..] => Some(of_utf_16(text, u16::from_be_bytes)),
+        _ => None,
+    };
+    match utf_16 {
+        Some(text) => text.ok_or_else(|| wrong("it begins like UTF-16 text, and is none; save it as UTF-8".to_owned())),
+        None => String::from_utf8(bytes)
+            .map_err(|error| wrong(format!("byte {} is not UTF-8 text", error.utf8_error().valid_up_to()))),
+    }
+}
+
+/// The text of UTF-16 bytes; `None` if they are none.
+fn of_utf_16(bytes: &[u8], unit: impl Fn([u8; 2]) -> u16) -> Option<String> {
+    let (pairs, rest) = bytes.as_chunks();
+    let units: Vec<u16> = pairs.iter().map(|pair| unit(*pair)).collect();
+    String::from_utf16(&units).ok().filter(|_| rest.is_empty())
 }
 
 #[cfg(test)]
@@ -73,5 +87,23 @@ mod tests {
         assert_eq!(read(&file, 11).unwrap().len(), 11);
         assert!(read(&file, 10).unwrap_err().to_string().contains("longer than 10 bytes"));
         assert!(read_text(&file).unwrap_err().to_string().contains("byte 10 is not UTF-8"));
+    }
+
+    #[test]
+    fn utf_16_with_a_byte_order_mark_is_text() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        let read = |bytes: &[u8]| {
+            std::fs::write(&file, bytes).unwrap();
+            read_text(&file).map_err(|error| error.to_string())
+        };
+        let bytes = |to_bytes: fn(u16) -> [u8; 2]| -> Vec<u8> {
+            "\u{feff}Gr\u{f6}\u{df}e \u{1f5fa}".encode_utf16().flat_map(to_bytes).collect()
+        };
+        for bytes in [bytes(u16::to_le_bytes), bytes(u16::to_be_bytes)] {
+            assert_eq!(read(&bytes).unwrap(), "Gr\u{f6}\u{df}e \u{1f5fa}");
+            assert!(read(&bytes[..bytes.len() - 1]).unwrap_err().contains("save it as UTF-8"));
+            assert!(read(&bytes[..bytes.len() - 2]).unwrap_err().contains("save it as UTF-8"));
+        }
     }
 }

@@ -3,6 +3,7 @@
 use super::reading::Reading;
 use super::{MapFileError, Mode};
 use crate::yaml;
+use gridweave_runtime::message::shortened;
 use serde::{Deserialize, Deserializer};
 use serde_norway::Value;
 use std::path::{Path, PathBuf};
@@ -42,7 +43,18 @@ impl<'de> Deserialize<'de> for Number {
             Value::String(text) => text.trim().parse().ok(),
             value => value.as_f64(),
         };
-        number.map(Self).ok_or_else(|| serde::de::Error::custom(format!("expected a number, not {value:?}")))
+        number.map(Self).ok_or_else(|| serde::de::Error::custom(not_a_number(&value)))
+    }
+}
+
+/// The error of a value that is no number, with the mend where its decimal sign is a comma.
+fn not_a_number(value: &Value) -> String {
+    let Value::String(text) = value else { return format!("expected a number, not {value:?}") };
+    let text = shortened(text.trim());
+    let with_point = text.replacen(',', ".", 1);
+    match with_point.parse::<f64>() {
+        Ok(_) => format!("expected a number, not `{text}`; the decimal sign is a point: {with_point}"),
+        Err(_) => format!("expected a number, not `{text}`"),
     }
 }
 
@@ -66,10 +78,15 @@ impl Description {
             return Err(wrong("resolution", problem));
         }
         let origin: Vec<f64> = origin.into_iter().map(|Number(value)| value).collect();
+        // `[1,5, 2,5, 0,0]` is six numbers.
+        let sign = if origin.len() > 3 { "; the decimal sign is a point" } else { "" };
         let origin = <[f64; 3]>::try_from(origin)
             .ok()
             .filter(|origin| origin.iter().all(|value| value.is_finite()))
-            .ok_or_else(|| wrong("origin", "must be three finite numbers: [x, y, yaw], metres and radians".into()))?;
+            .ok_or_else(|| {
+                let problem = format!("must be three finite numbers: [x, y, yaw], metres and radians{sign}");
+                wrong("origin", problem)
+            })?;
         for (field, value) in [("occupied_thresh", occupied_thresh), ("free_thresh", free_thresh)] {
             if !(0.0..=1.0).contains(&value) {
                 return Err(wrong(field, format!("is {value}; it must be between 0 and 1")));

@@ -17,7 +17,7 @@ pub use load::{image_of, load, load_as};
 pub use reading::Thresholds;
 pub use save::{image_beside, save};
 pub use sink::kind;
-pub use warning::MapFileWarning;
+pub use warning::{MapFileWarning, UnknownGrey};
 
 use gridweave_runtime::ros::{MapMetaData, OccupancyGrid};
 

@@ -2,10 +2,14 @@
 
 use super::Mode;
 use super::shades::{Histogram, Shades, is_transparent};
-use super::warning::MapFileWarning;
+use super::warning::{MapFileWarning, UnknownGrey};
 
 /// The shade in which map savers write unknown cells.
 const UNKNOWN_SHADE: usize = 205;
+/// The distance from the shade of unknown cells at which a JPEG has them, too.
+const LOSSY_SPREAD: usize = 4;
+/// The minimum share of the shade of unknown cells that its neighbours have where an image was a JPEG once.
+const LEAST_NOISE: f64 = 0.01;
 /// The minimum occupancy, above that of unknown, at which the darkest shade of an image is occupied.
 const LEAST_CONTRAST: f64 = 0.1;
 
@@ -42,17 +46,22 @@ impl Reading {
     /// The interpretation corrected by the image, and the corrections.
     pub(super) fn by_picture(self, shades: &Shades) -> (Self, MapFileWarning) {
         let has_opacity = shades.has_opacity();
-        // Where opacity scales the occupancy it says what is unknown, and `raw` has no thresholds.
-        if self.mode == Mode::Raw || self.mode == Mode::Scale && has_opacity {
+        // Where opacity scales the occupancy it says what is unknown.
+        if self.mode == Mode::Scale && has_opacity {
             return (self, MapFileWarning::default());
         }
         let Histogram { mut greys, transparent } = shades.histogram();
+        // `raw` has no thresholds.
+        if self.mode == Mode::Raw {
+            return (self, MapFileWarning { shaded: shaded_as_others(&greys), ..Default::default() });
+        }
         if self.negate {
             greys.reverse();
         }
-        let spread = if shades.is_lossy() { 4 } else { 0 };
         // 16 bits for each of 8 make 204 of 205.
         let shade = if greys[UNKNOWN_SHADE] > 0 { UNKNOWN_SHADE } else { UNKNOWN_SHADE - 1 };
+        let is_noisy = self.mode == Mode::Trinary && !shades.is_lossy() && has_noise_about(&greys, shade);
+        let spread = if shades.is_lossy() || is_noisy { LOSSY_SPREAD } else { 0 };
         let range = shade - spread..=shade + spread;
         // The shade is a peak of the histogram, and not part of a gradient.
         let stands_out = greys[shade] > greys[shade - spread - 1].max(greys[shade + spread + 1]);
@@ -65,15 +74,21 @@ impl Reading {
         let above = self.free_thresh.max(occupancy_of(shade));
         let has_grey_walls =
             self.mode == Mode::Trinary && darkest <= self.occupied_thresh && darkest > above + LEAST_CONTRAST;
-        let [first, last] = [*range.start(), *range.end()].map(|shade| if self.negate { 255 - shade } else { shade });
+        let [one, other] = [*range.start(), *range.end()].map(|shade| if self.negate { 255 - shade } else { shade });
+        let (first, last) = (one.min(other), one.max(other));
         let reading = Self {
-            unknown: is_misread.then(|| (grey_of(first.min(last)), grey_of(first.max(last)))),
+            unknown: is_misread.then(|| (grey_of(first), grey_of(last))),
             occupied_thresh: if has_grey_walls { (above + darkest) / 2.0 } else { self.occupied_thresh },
             transparent_is_unknown: has_opacity,
             ..self
         };
         let warning = MapFileWarning {
-            unknown: is_misread.then(|| (misread, if self.negate { 255 - shade } else { shade }, self.free_thresh)),
+            unknown: is_misread.then_some(UnknownGrey {
+                cells: misread,
+                shades: (first, last),
+                free_thresh: self.free_thresh,
+                is_noisy,
+            }),
             walls: has_grey_walls.then_some((darkest, self.occupied_thresh)),
             transparent: (transparent > 0).then_some(transparent),
             ..Default::default()
@@ -124,6 +139,22 @@ impl Reading {
             }
         }
     }
+}
+
+/// The numbers of pixels in shades that are no occupancy in the mode `raw`, which writes 255 for unknown, and of those that are;
+/// `None` where the latter are as many.
+fn shaded_as_others(greys: &[u64; 256]) -> Option<(u64, u64)> {
+    let (occupancies, shades) = (greys[..=100].iter().sum(), greys[101..255].iter().sum());
+    (shades > occupancies).then_some((shades, occupancies))
+}
+
+/// Whether the shades beside one that stands out are as frequent as a JPEG makes them, and each rarer than that one.
+fn has_noise_about(greys: &[u64; 256], shade: usize) -> bool {
+    let beside =
+        || (shade - LOSSY_SPREAD..=shade + LOSSY_SPREAD).filter(|other| *other != shade).map(|other| greys[other]);
+    // A gradient, or occupancies by degrees, have no such peak.
+    let is_peak = beside().all(|count| 4 * count < greys[shade]);
+    is_peak && beside().sum::<u64>() as f64 > LEAST_NOISE * greys[shade] as f64
 }
 
 /// A shade from 0 to 255 as a fraction of white.

@@ -6,6 +6,8 @@ use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
+mod by_picture;
+
 /// A folder with `map.yaml`, and the image `map.pgm` with the shades 0, 100, 205 above 254, 255, 50.
 fn folder(yaml: &str) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
@@ -117,57 +119,20 @@ fn numbers_may_be_quoted() {
     let quoted = "image: map.pgm\nresolution: '0.05'\norigin: ['1', \"-2.5\", 0.5]\noccupied_thresh: '0.65'\n\
                   free_thresh: \"0.25\"\nnegate: '0'";
     assert_eq!(cells(quoted), cells(&yaml("")));
-    assert!(error(&yaml("").replace("0.05", "wide")).contains("expected a number"));
-}
-
-#[test]
-fn the_image_overrides_the_thresholds_with_a_note() {
-    let read = |bytes: &[u8], more: &str| {
-        let (folder, path) = folder(&yaml(more));
-        fs::write(folder.path().join("map.pgm"), bytes).unwrap();
-        let (map, warning) = load_as(&path, Thresholds::ByPicture).unwrap();
-        (map.cells, warning.map(|warning| warning.to_string()).unwrap_or_default())
-    };
-    let (cells, warning) = read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "");
-    assert_eq!(cells, [100, -1, -1, 0]);
-    assert!(
-        warning.starts_with("2 cells in grey 205 are read as unknown; with free_thresh 0.25 they would be free"),
-        "{warning}"
-    );
-    assert!(warning.ends_with("--literal-thresholds reads the file literally"), "{warning}");
-    // A file in shades of grey without opacity has no other sign of what is unknown.
-    assert_eq!(read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "mode: scale").0, [100, -1, -1, 0]);
-    // Where white is occupied, 205 is nearly so, and 50 is unknown.
-    let (cells, warning) = read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "negate: 1");
-    assert_eq!(cells, [0, 100, 100, 100]);
-    assert!(warning.starts_with("3 cells are occupied and 1 are free: if its image is inverted"), "{warning}");
-    let (cells, warning) = read(b"P5\n4 1\n255\n\xff\x32\x32\x01", "negate: 1");
-    assert_eq!(cells, [100, -1, -1, 0]);
-    assert!(warning.starts_with("2 cells in grey 50 are read as unknown"), "{warning}");
-    // 16 bits of which each is 256 times one of 8: 205 becomes 204.
-    let (cells, warning) = read(b"P5\n4 1\n65535\n\x00\x00\xcd\x00\xcd\x00\xfe\x00", "");
-    assert_eq!(cells, [100, -1, -1, 0]);
-    assert!(warning.starts_with("2 cells in grey 204 are read as unknown"), "{warning}");
-    // A shade of a gradient.
-    assert_eq!(read(b"P5\n4 1\n255\n\x00\xcc\xcd\xce", "").0, [100, 0, 0, 0]);
-    let (cells, warning) = read(b"P5\n4 1\n255\n\x6e\x6e\xcd\xfe", "");
-    assert_eq!(cells, [100, 100, -1, 0]);
-    assert!(warning.contains("the darkest cells, with occupancy 0.57, are read as occupied"), "{warning}");
-}
-
-#[test]
-fn bmp_and_jpeg_are_read() {
-    let (folder, path) = folder("");
-    // Blocks of eight pixels, as in a JPEG.
-    let shades = [0u8, 205, 254];
-    let image = ImageBuffer::from_fn(24, 8, |x, _| Luma([shades[x as usize / 8]]));
-    for name in ["map.bmp", "map.jpg"] {
-        DynamicImage::ImageLuma8(image.clone()).save(folder.path().join(name)).unwrap();
-        fs::write(&path, yaml("").replace("map.pgm", name)).unwrap();
-        let (map, warning) = load_as(&path, Thresholds::ByPicture).unwrap();
-        let middle: Vec<i8> = [4, 12, 20].map(|column| map.cells[3 * 24 + column]).into();
-        assert_eq!(middle, [100, -1, 0], "{name}: {warning:?}");
+    assert!(error(&yaml("").replace("0.05", "wide")).contains("expected a number, not `wide`"));
+    for (wrong, right) in [("0,05", "0.05"), ("'-1,5'", "-1.5")] {
+        let error = error(&yaml("").replace("0.05", wrong));
+        assert!(error.contains(&format!("`; the decimal sign is a point: {right}")), "{error}");
     }
+    assert!(error(&yaml("").replace("[1, -2.5, 0.5]", "[1,0, -2,5, 0,5]")).contains("the decimal sign is a point"));
+}
+
+#[test]
+fn a_file_in_utf_16_is_read_as_its_byte_order_mark_says() {
+    let (_folder, path) = folder("");
+    let text = format!("\u{feff}{}", yaml("negate: 0"));
+    fs::write(&path, text.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<u8>>()).unwrap();
+    assert_eq!(load(&path).unwrap().cells, [0, 0, 100, 100, -1, 0]);
 }
 
 #[test]

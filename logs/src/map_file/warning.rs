@@ -8,15 +8,44 @@ use std::path::PathBuf;
 pub struct MapFileWarning {
     /// The image of the file that cannot be reached, and the one that was read instead.
     pub image: Option<(PathBuf, PathBuf)>,
-    /// The number of cells in the grey of unknown ones that are unknown, that grey (205 from a map saver), and the
-    /// `free_thresh` that would make them free.
-    pub unknown: Option<(u64, usize, f64)>,
+    /// The cells in the grey of unknown ones.
+    pub unknown: Option<UnknownGrey>,
     /// The minimum occupancy of occupied cells, and the `occupied_thresh` that no cell reaches.
     pub walls: Option<(f64, f64)>,
     /// The number of transparent cells, which are unknown.
     pub transparent: Option<u64>,
+    /// The numbers of pixels in shades that are no occupancy in the mode `raw`, and of others, where most are of the former.
+    pub shaded: Option<(u64, u64)>,
     /// The numbers of occupied and of free cells, where there are more occupied ones: the image may be inverted.
     pub inverted: Option<(u64, u64)>,
+}
+
+/// Cells in the grey of unknown ones that the thresholds would make free.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnknownGrey {
+    /// The number of these cells.
+    pub cells: u64,
+    /// The first and the last shade; both are 205 from a map saver.
+    pub shades: (usize, usize),
+    /// The `free_thresh` of the file.
+    pub free_thresh: f64,
+    /// Whether the image has noise about its shades as a JPEG has, and is none.
+    pub is_noisy: bool,
+}
+
+impl fmt::Display for UnknownGrey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { cells, shades: (first, last), free_thresh, is_noisy } = self;
+        write!(f, "{cells} cells in grey {first}")?;
+        if last > first {
+            write!(f, " to {last}")?;
+        }
+        write!(f, " are read as unknown; with free_thresh {free_thresh} they would be free")?;
+        match is_noisy {
+            true => f.write_str(" (its shades are as noisy as those of an image that was a JPEG)"),
+            false => Ok(()),
+        }
+    }
 }
 
 impl MapFileWarning {
@@ -32,10 +61,8 @@ impl fmt::Display for MapFileWarning {
         if let Some((missing, read)) = &self.image {
             parts.push(format!("its image {} cannot be reached; {} is read", missing.display(), read.display()));
         }
-        if let Some((cells, grey, free_thresh)) = self.unknown {
-            parts.push(format!(
-                "{cells} cells in grey {grey} are read as unknown; with free_thresh {free_thresh} they would be free"
-            ));
+        if let Some(unknown) = self.unknown {
+            parts.push(unknown.to_string());
         }
         if let Some((from, occupied_thresh)) = self.walls {
             parts.push(format!(
@@ -48,6 +75,12 @@ impl fmt::Display for MapFileWarning {
         }
         if self.unknown.is_some() || self.walls.is_some() || self.transparent.is_some() {
             parts.push("--literal-thresholds reads the file literally".to_owned());
+        }
+        if let Some((shades, occupancies)) = self.shaded {
+            parts.push(format!(
+                "{shades} pixels have shades from 101 to 254, which `mode: raw` reads as unknown, and {occupancies} are \
+                 occupancies from 0 to 100: if black is occupied and white is free in its image, set `mode: trinary`"
+            ));
         }
         if let Some((occupied, free)) = self.inverted {
             parts.push(format!(
