@@ -1,7 +1,7 @@
 //! Robot poses from tf, the tree of frames that ROS programs publish edge by edge.
 
 use crate::schemas::full_type_name;
-use gridweave_runtime::message::Channel;
+use gridweave_runtime::message::{Channel, LONGEST_ROBOT_NAME};
 use gridweave_runtime::ros::{Header, Point, Pose, PoseStamped, Quaternion, RosMessage, TFMessage, Time, Transform};
 use gridweave_runtime::stage::{TfFrames, frame_of_robot, match_robot};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
@@ -23,9 +23,6 @@ pub fn is_static(topic: &str) -> bool {
 
 /// The maximum number of transforms between two frames, as in tf2. More are no robot, and each message would follow all of them.
 const LONGEST_PATH: usize = 1000;
-
-/// The maximum length of a name in ROS 2, bytes: that of a topic of DDS. A robot with a longer name is none.
-pub(crate) const LONGEST_ROS_NAME: usize = 255;
 
 /// The latest transform of each frame to its parent.
 #[derive(Clone, Debug, Default)]
@@ -197,7 +194,7 @@ impl TfPoses {
         let Some(frames) = &self.frames else { return };
         for pattern in [&frames.map_frame, &frames.base_frame] {
             if let Some(robot) = match_robot(pattern, frame)
-                && robot.len() <= LONGEST_ROS_NAME
+                && robot.len() <= LONGEST_ROBOT_NAME
                 && !self.robots.contains_key(robot)
             {
                 let named = |pattern: &str| pattern.replace("{robot}", robot);

@@ -3,8 +3,8 @@
 use super::scans::is_scan;
 use super::tag_reader::{TagReader, has_poses_in_tf, known_fields};
 use crate::schemas::full_type_name;
-use crate::tf::{LONGEST_ROS_NAME, tf_topic};
-use gridweave_runtime::message::{Channel, shortened};
+use crate::tf::tf_topic;
+use gridweave_runtime::message::{Channel, LONGEST_ROBOT_NAME, LONGEST_TOPIC, shortened};
 use gridweave_runtime::ros::{
     OccupancyGrid, OccupancyGridUpdate, Odometry, PoseStamped, PoseWithCovarianceStamped, RosMessage, TagRange,
     TopologicalMap,
@@ -236,18 +236,20 @@ impl RobotChannels {
         self.topics.tf.is_some() || self.sees_tags() || with_frames.iter().any(|robots| !robots.is_empty())
     }
 
-    /// Classifies a channel. What cannot be a name of ROS names no robot: the others go on without it.
+    /// Classifies a channel. One whose names do not fit in the header of a message is no robot's: the others go on without it.
     pub(crate) fn classify<'a>(&self, channel: &'a Channel) -> Classified<'a> {
         let classified = self.classify_by_type(channel);
-        if classified.role == Role::Other || fits(classified.robot) {
+        let name_fits = fits(classified.robot);
+        if classified.role == Role::Other || (name_fits && channel.topic.len() <= LONGEST_TOPIC) {
             return classified;
         }
         let (topic, length) = (shortened(&channel.topic), classified.robot.len());
         let mismatch = format!(
-            "`{topic}` is not read as a robot's: the robot's name has {length} bytes, and names of ROS have at most \
-             {LONGEST_ROS_NAME}; rename the topic"
+            "`{topic}` is not read as a robot's: the robot's name has {length} bytes, and at most {LONGEST_ROBOT_NAME} \
+             fit; rename the topic"
         );
-        Classified { role: Role::Other, robot: "", mismatch: Some(mismatch) }
+        // Of a topic that is too long, it is said where its messages are dropped.
+        Classified { role: Role::Other, robot: "", mismatch: (!name_fits).then_some(mismatch) }
     }
 
     fn classify_by_type<'a>(&self, channel: &'a Channel) -> Classified<'a> {
@@ -317,9 +319,9 @@ impl RobotChannels {
     }
 }
 
-/// Whether the name of a robot may come from ROS.
+/// Whether the name of a robot fits in the header of a message.
 fn fits(robot: &str) -> bool {
-    robot.len() <= LONGEST_ROS_NAME
+    robot.len() <= LONGEST_ROBOT_NAME
 }
 
 fn role_of_map(type_name: &str) -> Option<Role> {

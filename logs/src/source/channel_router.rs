@@ -8,7 +8,7 @@ use crate::names::rename_advice;
 use crate::robots::{CellValues, MapOrigin, MergedMaps, RobotChannels, Role};
 use crate::schemas::full_type_name;
 use crate::tf::{is_static, tf_topic};
-use gridweave_runtime::message::{Channel, FixedText, MessageHeader, shortened};
+use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
 use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, TFMessage, decode};
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
 use std::collections::BTreeMap;
@@ -227,34 +227,26 @@ impl ChannelRouter {
         undecided.iter().try_for_each(|(index, stamp, data)| self.pass_map(*index, *stamp, data, may_hold, output))
     }
 
-    /// Returns the index of a channel's route, and adds the route if there is none. `None` if the topic's name is too long and
-    /// no stage needs the channel.
-    pub(super) fn add(
-        &mut self,
-        channel: Channel,
-        output: &Output<RobotMessages>,
-    ) -> Result<Option<usize>, StageError> {
+    /// Returns the index of a channel's route, and adds the route if there is none. `None`, with a warning, if the topic's
+    /// name is too long.
+    pub(super) fn add(&mut self, channel: Channel, output: &Output<RobotMessages>) -> Option<usize> {
         if let Some(&index) = self.by_channel.get(&channel) {
-            return Ok(Some(index));
+            return Some(index);
         }
         let index = self.routes.len();
-        let doing = |what: &str| format!("read the topic `{}`: its {what} is too long", shortened(&channel.topic));
         let classified = self.roles.classify(&channel);
         if let Some(mismatch) = classified.mismatch {
             output.warn(mismatch);
         }
         let topic = match FixedText::new(&channel.topic) {
-            Err(error) if classified.role == Role::Other => {
+            Ok(topic) => topic,
+            Err(error) => {
                 output.warn(format!("messages on a topic were dropped: its name {error}"));
-                return Ok(None);
+                return None;
             }
-            topic => topic.map_err(|error| StageError::new(doing("name"), error))?,
         };
-        let robot = match FixedText::new(classified.robot) {
-            // A message that is passed on unchanged needs no robot.
-            Err(_) if classified.role == Role::Other => FixedText::EMPTY,
-            robot => robot.map_err(|error| StageError::new(doing("robot's name"), error))?,
-        };
+        // A message that is passed on unchanged needs no robot.
+        let robot = FixedText::new(classified.robot).unwrap_or_default();
         let header = MessageHeader {
             // 0 is the channel of messages that no log describes.
             channel: index as u32 + 1,
@@ -277,7 +269,7 @@ impl ChannelRouter {
             messages: 0,
             unreadable: 0,
         });
-        Ok(Some(index))
+        Some(index)
     }
 
     /// The topics of occupancy grids that have been seen.

@@ -133,7 +133,7 @@ impl LiveRouter {
         if let Some(why) = channel.named.unrenamed_frames() {
             output.warn(why);
         }
-        let Some(route) = self.router.add(channel.named.channel.clone(), output)? else { return Ok(()) };
+        let Some(route) = self.router.add(channel.named.channel.clone(), output) else { return Ok(()) };
         let stamp = Stamp { sequence: message.sequence, publish_time: message.publish_time };
         self.router.send(route, stamp, data, output)
     }
@@ -165,7 +165,7 @@ impl LiveRouter {
         for (number, data) in self.frames.kept() {
             let Some(channel) = self.channels.get(*number) else { continue };
             if channel.named.rename_frames(data, &mut self.renamed) == Renamed::Copied
-                && let Some(route) = self.router.add(channel.named.channel.clone(), output)?
+                && let Some(route) = self.router.add(channel.named.channel.clone(), output)
             {
                 self.router.learn(route, &self.renamed, output);
             }

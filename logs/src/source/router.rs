@@ -111,7 +111,7 @@ impl Router {
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
         let channel = kind.channel();
-        match self.channels.add(channel, output)? {
+        match self.channels.add(channel, output) {
             Some(route) => self.channels.pass_on(route, Stamp { sequence: 0, publish_time: 0 }, body, output),
             None => Ok(()),
         }
@@ -203,7 +203,7 @@ impl Router {
         let target = match self.names.wants(message.file, message.channel) {
             false => Target::Nothing,
             true => {
-                let Some(index) = self.channels.add(channel, output)? else { return Ok(None) };
+                let Some(index) = self.channels.add(channel, output) else { return Ok(None) };
                 if let Some(why) = self.names.unrenamed_frames(message.file, message.channel) {
                     output.warn(why);
                 }

@@ -1,8 +1,10 @@
 //! Tag readings from custom message definitions, and from the published definitions of detectors.
 
 use super::*;
+use crate::robots::{RobotChannels, Role};
 use gridweave_runtime::message::LogTime;
-use gridweave_runtime::ros::{Header, encode};
+use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, encode};
+use gridweave_runtime::stage::RobotTopics;
 
 const UWB: &str = "std_msgs/Header header\nAnchor[] anchors\n\
     ================================================================================\nMSG: uwb_msgs/Anchor\n\
@@ -171,21 +173,40 @@ fn tags_of_isaac_ros_are_read_by_its_published_definition() {
     assert_eq!((found.stamp, found.frame_id.as_str()), (Time { sec: 3, nanosec: 4 }, "camera"));
 }
 
-#[test]
-fn tags_of_aruco_opencv_are_read_by_its_published_definition() {
-    let name = "aruco_opencv_msgs/msg/ArucoDetection";
-    let text = published(
+/// The published definition of `aruco_opencv_msgs/msg/ArucoDetection`.
+fn aruco_opencv() -> String {
+    published(
         "std_msgs/Header header\naruco_opencv_msgs/MarkerPose[] markers\naruco_opencv_msgs/BoardPose[] boards",
         &[
             ("aruco_opencv_msgs/MarkerPose", "uint16 marker_id\ngeometry_msgs/Pose pose\n"),
             ("aruco_opencv_msgs/BoardPose", "string board_name\ngeometry_msgs/Pose pose\n"),
         ],
-    );
+    )
+}
+
+#[test]
+fn tags_of_aruco_opencv_are_read_by_its_published_definition() {
+    let name = "aruco_opencv_msgs/msg/ArucoDetection";
+    let text = aruco_opencv();
     let header = Header::new(LogTime(1), "camera");
     let bytes = encode(&(header, vec![(7u16, POSE)], vec![("board", POSE)])).unwrap();
     let reader = TagReader::new(&channel(name, &text), &known_fields(name).unwrap()).unwrap();
     let measurement = Measurement::Position(Point3::new(0.5, -0.25, 2.0));
     assert_eq!(reader.read("robot1", &bytes).unwrap().readings, [TagReading { tag_id: "7".into(), measurement }]);
+}
+
+#[test]
+fn tags_on_a_topic_that_is_too_long_are_no_robots() {
+    let map = Channel { topic: "/robot1/map".into(), ..channel(OccupancyGrid::NAME, "") };
+    let tags = |length: usize| Channel {
+        topic: format!("/robot1/{}", "x".repeat(length - 8)),
+        ..channel("aruco_opencv_msgs/msg/ArucoDetection", &aruco_opencv())
+    };
+    for (length, role) in [(128, Role::TagMessage), (129, Role::Other)] {
+        let tags = tags(length);
+        let roles = RobotChannels::new(RobotTopics::default(), [&map, &tags].into_iter());
+        assert_eq!(roles.classify(&tags).role, role, "{length} bytes");
+    }
 }
 
 #[test]
