@@ -21,6 +21,10 @@ pub fn is_static(topic: &str) -> bool {
     topic.ends_with("tf_static")
 }
 
+/// The key in the metadata of an announced channel of transforms under which a source names the map frames of robots, a line
+/// for each. A sink needs them before the first transform, and maps may come late.
+pub(crate) const MAP_FRAMES: &str = "gridweave_map_frames";
+
 /// The maximum number of transforms between two frames, as in tf2. More are no robot, and each message would follow all of them.
 const LONGEST_PATH: usize = 1000;
 

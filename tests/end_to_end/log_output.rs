@@ -1,9 +1,10 @@
 //! Logs that are written: they explain themselves, keep what the input holds beside messages, and may be bags of rosbag2.
 
-use crate::support::{SMALL_BUILDING, gridweave, simulate};
+use crate::support::{LogBuilder, SMALL_BUILDING, TestMap, gridweave, simulate};
 use gridweave_logs::reader::{LogFile, LogReader, SupplementKind};
 use gridweave_runtime::message::LogTime;
-use gridweave_runtime::ros::{TFMessage, decode};
+use gridweave_runtime::ros::{OccupancyGrid, TFMessage, TransformStamped, decode};
+use gridweave_tests::header;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs;
@@ -85,7 +86,8 @@ fn a_path_with_a_slash_behind_it_is_a_bag_of_rosbag2() {
     gridweave(folder.path(), &["run", "auto_merge", "--input", "in.mcap", "-o", "merged"]).assert(0, &[]);
     gridweave(folder.path(), &["merge", "in.mcap", "-o", "merged.mcap"]).assert(0, &[]);
     assert!(fs::read(path("merged/merged_0.mcap")).unwrap() == fs::read(path("merged.mcap")).unwrap());
-    assert_has_one_parent(&path("merged.mcap"));
+    let frames = ["robot1/base_link", "robot1/map", "robot2/base_link", "robot2/map", "world_origin"];
+    assert_eq!(frames_with_one_parent(&path("merged.mcap")), frames);
 
     gridweave(folder.path(), &["convert", "merged/", "-o", "copy/"]).assert(0, &["wrote ", "to copy/"]);
     assert!(path("copy/copy_0.mcap").exists() && path("copy/metadata.yaml").exists());
@@ -132,20 +134,54 @@ fn a_path_that_ends_in_bag_is_a_bag_of_ros_1() {
     gridweave(folder.path(), &["recover", "in.bag", "-o", "out.bag"]).assert(2, &["convert out.mcap -o out.bag"]);
 }
 
-/// No frame changes its parent over the whole log.
-fn assert_has_one_parent(log: &Path) {
+#[test]
+fn a_map_frame_of_any_name_that_was_placed_before_its_map_came_has_one_parent() {
+    let folder = TempDir::new().unwrap();
+    let placed = |parent: &str, child: &str| TFMessage {
+        transforms: vec![TransformStamped {
+            header: header(0.0, parent),
+            child_frame_id: child.into(),
+            ..Default::default()
+        }],
+    };
+    let map = TestMap::flat();
+    let cells: Vec<u8> = map.cells.iter().map(|cell| *cell as u8).collect();
+    let mut log = LogBuilder::new(&folder.path().join("in.mcap"));
+    for robot in ["robot1", "robot2"] {
+        log.message(0.0, "/tf_static", &placed("earth", &format!("{robot}/slam")));
+        log.message(0.0, "/tf", &placed("earth", &format!("{robot}/slam")));
+    }
+    for robot in ["robot1", "robot2"] {
+        let header = header(20.0, format!("{robot}/slam"));
+        let map = OccupancyGrid { header, info: map.info, data: &cells };
+        log.message(20.0, &format!("/{robot}/map"), &map);
+        log.message(21.0, "/tf", &placed(&format!("{robot}/slam"), &format!("{robot}/base_link")));
+    }
+    log.finish();
+    for engine in ["single", "threads", "processes"] {
+        let ended = gridweave(folder.path(), &["merge", "in.mcap", "-o", "out.mcap", "--engine", engine]);
+        ended.assert(0, &["merged 2 of 2", "were dropped: this run places it"]);
+        let frames = frames_with_one_parent(&folder.path().join("out.mcap"));
+        let expected = ["robot1/base_link", "robot1/slam", "robot2/base_link", "robot2/slam", "world_origin"];
+        assert_eq!(frames, expected);
+    }
+}
+
+/// The frames that the transforms of a log place, each in one parent over the whole log.
+#[track_caller]
+fn frames_with_one_parent(log: &Path) -> Vec<String> {
     let mut parents = BTreeMap::new();
     let bytes = fs::read(log).unwrap();
     for message in mcap::MessageStream::new(&bytes).unwrap() {
         let message = message.unwrap();
-        if !message.channel.topic.ends_with("tf_static") {
+        if !message.channel.topic.ends_with("tf_static") && !message.channel.topic.ends_with("tf") {
             continue;
         }
+        assert!(!message.channel.metadata.keys().any(|key| key.starts_with("gridweave")));
         for one in decode::<TFMessage>(&message.data).unwrap().transforms {
             let parent = parents.entry(one.child_frame_id.clone()).or_insert(one.header.frame_id.clone());
             assert_eq!(*parent, one.header.frame_id, "{}", one.child_frame_id);
         }
     }
-    let frames: Vec<&str> = parents.keys().map(String::as_str).collect();
-    assert_eq!(frames, ["robot1/map", "robot2/map", "world_origin"]);
+    parents.into_keys().collect()
 }

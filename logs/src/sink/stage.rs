@@ -218,6 +218,7 @@ impl McapSink {
 
 impl McapSink {
     pub(super) fn announce(&mut self, wire: usize, number: u32, channel: &Channel) -> Result<(), StageError> {
+        let channel = &self.given_frames.announce(channel);
         let target = match self.result_topics.route(channel) {
             _ if let Some(kind) = SupplementKind::of_channel(channel) => Target::Supplement(kind),
             _ if !self.is_wanted(&channel.topic) => Target::Unwanted,
@@ -245,7 +246,9 @@ impl McapSink {
             0 if !self.is_wanted(message.header().topic.as_str()) => return Ok(()),
             0 => {
                 if self.inputs.get(message.wire()).is_some_and(|input| input.ros_type == TFMessage::NAME) {
-                    self.given_frames.learn(message.bytes());
+                    for conflict in self.given_frames.learn(message.bytes()) {
+                        output.warn(conflict.to_string());
+                    }
                 }
                 self.result_lane(message, output)?
             }

@@ -7,11 +7,11 @@ use super::{RobotMessages, RobotReading};
 use crate::names::rename_advice;
 use crate::robots::{CellValues, MapOrigin, MergedMaps, RobotChannels, Role};
 use crate::schemas::full_type_name;
-use crate::tf::{is_static, tf_topic};
+use crate::tf::{MAP_FRAMES, is_static, tf_topic};
 use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
 use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, TFMessage, decode};
-use gridweave_runtime::stage::{Output, RobotTopics, StageError};
-use std::collections::BTreeMap;
+use gridweave_runtime::stage::{Output, RobotTopics, StageError, frame_of_robot};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Routes messages to the output ports of their channels, and sends what is derived from them.
 pub(super) struct ChannelRouter {
@@ -27,6 +27,8 @@ pub(super) struct ChannelRouter {
     routes: Vec<Route>,
     by_channel: BTreeMap<Channel, usize>,
     derived: Derived,
+    /// The frames of the robots' maps that are known before the first message.
+    map_frames: BTreeSet<String>,
 }
 
 impl ChannelRouter {
@@ -49,6 +51,7 @@ impl ChannelRouter {
             holds_undecided: true,
             routes: Vec::new(),
             by_channel: BTreeMap::new(),
+            map_frames: BTreeSet::new(),
         }
     }
 
@@ -131,6 +134,19 @@ impl ChannelRouter {
     /// Learns the frame of a robot's map before it comes.
     pub(super) fn learn_map_frame(&mut self, robot: &str, frame: &str) {
         self.derived.set_map_frame(robot, frame);
+        if !frame.is_empty() {
+            self.map_frames.insert(frame_of_robot(robot, frame).into_owned());
+        }
+    }
+
+    /// The channel as it is announced: one of transforms names the frames of maps.
+    fn announced(&self, channel: &Channel) -> Channel {
+        let mut announced = channel.clone();
+        if tf_topic(channel).is_some() && !self.map_frames.is_empty() {
+            let frames: Vec<&str> = self.map_frames.iter().map(String::as_str).collect();
+            announced.metadata.insert(MAP_FRAMES.to_owned(), frames.join("\n"));
+        }
+        announced
     }
 
     /// Sends the maps that were updated since they were last sent.
@@ -255,11 +271,10 @@ impl ChannelRouter {
             ..Default::default()
         };
         let (role, robot) = (classified.role, classified.robot.to_owned());
-        self.by_channel.insert(channel.clone(), index);
         let latch = Latch::of(&channel, role == Role::Map);
         let tag_reader = self.roles.tag_reader(&channel).filter(|_| role == Role::TagMessage);
         self.routes.push(Route {
-            channel,
+            channel: self.announced(&channel),
             role,
             robot,
             tag_reader,
@@ -269,6 +284,7 @@ impl ChannelRouter {
             messages: 0,
             unreadable: 0,
         });
+        self.by_channel.insert(channel, index);
         Some(index)
     }
 

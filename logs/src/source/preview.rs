@@ -8,14 +8,16 @@ use super::channel_router::ChannelRouter;
 use crate::names::Names;
 use crate::reader::{ChannelPart, LogFile, LogReader};
 use crate::robots::Role;
-use crate::tf::is_static;
+use crate::tf::{is_static, tf_topic};
 use gridweave_runtime::ros::{Header, TFMessage, decode};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Teaches `router` the static transforms of the files, the first transforms of others, and the frames of the first maps.
 pub(super) fn learn_ahead(files: &Arc<[LogFile]>, names: &Names, router: &mut ChannelRouter) {
-    if !router.needs_frames() {
+    let needs_frames = router.needs_frames();
+    // Whoever writes transforms needs the frames of the maps.
+    if !needs_frames && names.channels().all(|channel| tf_topic(channel).is_none()) {
         return;
     }
     let mut wanted = BTreeMap::new();
@@ -24,8 +26,8 @@ pub(super) fn learn_ahead(files: &Arc<[LogFile]>, names: &Names, router: &mut Ch
             let Some(channel) = names.channel(file, number).filter(|_| names.wants(file, number)) else { continue };
             let classified = router.roles().classify(channel);
             let ahead = match classified.role {
-                Role::Tf if is_static(&channel.topic) => Ahead::StaticTransforms,
-                Role::Tf => Ahead::Transforms,
+                Role::Tf if needs_frames && is_static(&channel.topic) => Ahead::StaticTransforms,
+                Role::Tf if needs_frames => Ahead::Transforms,
                 Role::Map => Ahead::Map,
                 _ => continue,
             };
