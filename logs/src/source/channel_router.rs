@@ -251,9 +251,6 @@ impl ChannelRouter {
         }
         let index = self.routes.len();
         let classified = self.roles.classify(&channel);
-        if let Some(mismatch) = classified.mismatch {
-            output.warn(mismatch);
-        }
         let topic = match FixedText::new(&channel.topic) {
             Ok(topic) => topic,
             Err(error) => {
@@ -261,6 +258,9 @@ impl ChannelRouter {
                 return None;
             }
         };
+        if let Some(mismatch) = classified.mismatch {
+            output.warn(mismatch);
+        }
         // A message that is passed on unchanged needs no robot.
         let robot = FixedText::new(classified.robot).unwrap_or_default();
         let header = MessageHeader {

@@ -5,7 +5,7 @@ use crate::map_file::{self, GridMap, Thresholds};
 use crate::names::name_map_files;
 use crate::qos;
 use crate::schemas::schema_text;
-use gridweave_runtime::message::{Channel, FixedText, LogTime, MessageHeader};
+use gridweave_runtime::message::{Channel, FixedText, LogTime, MessageHeader, TextTooLong};
 use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, encode};
 use gridweave_runtime::stage::{Context, Output, Source, StageError};
 use std::path::PathBuf;
@@ -116,12 +116,14 @@ impl NamedMap {
         let message = OccupancyGrid { header, info: map.info, data: bytemuck::cast_slice(&map.cells) };
         let bytes = encode(&message).map_err(|error| StageError::new(doing(), error))?;
 
+        let too_long =
+            |error: TextTooLong| StageError::new(doing(), error).with_help("ROBOT=FILE.yaml names the robot of a map");
         let header = MessageHeader {
             log_time: time,
             publish_time: time.0,
             channel: channel_number,
-            robot: FixedText::new(&self.robot).map_err(|error| StageError::new(doing(), error))?,
-            topic: FixedText::new(&self.topic).map_err(|error| StageError::new(doing(), error))?,
+            robot: FixedText::new(&self.robot).map_err(too_long)?,
+            topic: FixedText::new(&self.topic).map_err(too_long)?,
             ..Default::default()
         };
         let channel = Channel {
