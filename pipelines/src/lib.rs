@@ -11,6 +11,7 @@
 //! ```
 
 #![forbid(unsafe_code)]
+mod address_space;
 mod cli;
 mod commands;
 pub mod common_places;
@@ -53,6 +54,10 @@ pub fn command_with(
     verbs: &[Verb],
     on_warning: fn(&str, &str),
 ) -> ExitCode {
+    if let Err(error) = address_space::keep_within_limit() {
+        terminal::eprint_line(format_args!("error: {error:#}"));
+        return ExitCode::FAILURE;
+    }
     ExitCode::from(command_line(std::env::args_os(), kinds, verbs, on_warning))
 }
 

@@ -1,6 +1,6 @@
 //! Too little address space (`ulimit -v`): a run that cannot keep the limit is refused, and what was there before stays.
 
-use crate::support::{Ended, LogBuilder, TestMap, gridweave_program, part, start_program};
+use crate::support::{Ended, LogBuilder, TestMap, gridweave_program, part, simulate, start_program};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
@@ -10,6 +10,11 @@ fn merge_within(folder: &Path, kilobytes: &str, engine: &str) -> Ended {
     let mut log = LogBuilder::new(&folder.join("input.mcap"));
     log.map(0.0, "robot1", &TestMap::room()).map(0.0, "robot2", &TestMap::room());
     log.finish();
+    run_merge_within(folder, kilobytes, engine)
+}
+
+/// Merges `input.mcap` with so many kilobytes of address space.
+fn run_merge_within(folder: &Path, kilobytes: &str, engine: &str) -> Ended {
     let limited = "ulimit -v \"$1\"; shift; exec \"$@\"";
     let program = gridweave_program().to_str().unwrap();
     let merge = ["merge", "input.mcap", "-o", "output.mcap", "--engine", engine];
@@ -27,6 +32,19 @@ fn a_run_of_threads_within_too_little_address_space_is_refused_and_says_what_to_
         ended.assert(1, &["683 MB (`ulimit -v`)", "--engine single", engine]);
         assert_eq!(fs::read_to_string(&output).unwrap(), "what was there before");
         assert!(!part(&output).exists());
+    }
+}
+
+#[test]
+fn a_run_in_one_thread_works_within_little_address_space_or_is_refused() {
+    let folder = TempDir::new().unwrap();
+    simulate(folder.path(), "input.mcap", &["--robots", "2"]);
+    for kilobytes in [100_000, 140_000, 180_000, 200_000, 230_000, 260_000, 300_000, 350_000, 400_000, 500_000] {
+        let ended = run_merge_within(folder.path(), &kilobytes.to_string(), "single");
+        match kilobytes < 128 << 10 {
+            true => ended.assert(1, &["at least 128 MB", "97 MB (`ulimit -v`): raise that limit"]),
+            false => ended.assert(0, &["merged 2 of 2 robots"]),
+        }
     }
 }
 

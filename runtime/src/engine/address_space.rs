@@ -8,7 +8,7 @@ use super::{EngineKind, Failure};
 use crate::pipeline::Pipeline;
 use rustix::process::{Resource, getrlimit};
 
-/// What the program itself reserves, bytes.
+/// What the program itself reserves, and a run in one thread at the least, bytes.
 const PROGRAM: u64 = 128 << 20;
 /// What the thread of a stage reserves, bytes: its stack, and what the allocator of the C library sets aside for it.
 const STAGE: u64 = 64 << 20;
@@ -22,6 +22,7 @@ const LITTLE: u64 = 512 << 20;
 /// The limit is too low.
 pub(super) fn check(engine: EngineKind, pipeline: &Pipeline) -> Result<(), Failure> {
     let limit = getrlimit(Resource::As).current;
+    within(engine, pipeline.stages.len(), limit)?;
     if let Some(limit) = limit.filter(|limit| engine == EngineKind::Single && *limit < LITTLE) {
         tracing::warn!(
             "the address space of this program is limited to {} MB (`ulimit -v`); if that is not enough, the program will end with \
@@ -29,12 +30,13 @@ pub(super) fn check(engine: EngineKind, pipeline: &Pipeline) -> Result<(), Failu
             limit >> 20
         );
     }
-    within(engine, pipeline.stages.len(), limit)
+    Ok(())
 }
 
 fn within(engine: EngineKind, stages: usize, limit: Option<u64>) -> Result<(), Failure> {
-    let needed = PROGRAM + STAGE * stages as u64;
-    match limit.filter(|limit| engine != EngineKind::Single && *limit < needed) {
+    let threads = if engine == EngineKind::Single { 0 } else { stages as u64 };
+    let needed = PROGRAM + STAGE * threads;
+    match limit.filter(|limit| *limit < needed) {
         Some(limit) => Err(Failure::AddressSpace { engine: engine.to_string(), needed, limit }),
         None => Ok(()),
     }
@@ -48,7 +50,9 @@ mod tests {
     fn only_a_limit_that_threads_cannot_keep_is_refused() {
         assert_eq!(within(EngineKind::Threads, 17, None), Ok(()));
         assert_eq!(within(EngineKind::Threads, 17, Some(1300 << 20)), Ok(()));
-        assert_eq!(within(EngineKind::Single, 17, Some(100 << 20)), Ok(()));
+        assert_eq!(within(EngineKind::Single, 17, Some(128 << 20)), Ok(()));
+        let error = within(EngineKind::Single, 17, Some(100 << 20)).unwrap_err().to_string();
+        assert!(error.contains("128 MB") && error.ends_with("(`ulimit -v`): raise that limit"), "{error}");
         let error = within(EngineKind::Processes, 17, Some(800 << 20)).unwrap_err().to_string();
         assert!(error.contains("1216 MB") && error.contains("800 MB (`ulimit -v`)"), "{error}");
     }

@@ -72,9 +72,10 @@ pub enum Failure {
     /// The engine reserves more address space than the program may have.
     #[error(
         "needs at least {} MB of address space with the engine `{engine}`, which reserves far more than it uses, and this program \
-         may have {} MB (`ulimit -v`): raise that limit, or, for a replay, use `--engine single`",
+         may have {} MB (`ulimit -v`): raise that limit{}",
         needed >> 20,
-        limit >> 20
+        limit >> 20,
+        if engine == "single" { "" } else { ", or, for a replay, use `--engine single`" }
     )]
     AddressSpace {
         /// The name of the engine.
