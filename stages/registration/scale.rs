@@ -21,6 +21,8 @@ const FINEST_STEP: f64 = 0.002;
 const LEAST_ERROR: f64 = 0.01;
 /// Shifts of regions that are the noise of drawing, metres.
 const NOISE: f64 = 0.01;
+/// Factors of a resolution that was halved or doubled with the image, or taken from another file.
+const DOUBLINGS: [f64; 2] = [0.5, 2.0];
 /// Number of the best factors that are looked at closely.
 const LOOKED_AT: usize = 2;
 /// Least probability at which a scale is reported, which is not a merge.
@@ -36,13 +38,25 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Finds the scale at which two maps agree, from `1 / (1 + range)` to `1 + range`. `None` if there is no scale
-    /// other than 1 at which that is more probable than not.
+    /// Finds the scale at which two maps agree, from `1 / (1 + range)` to `1 + range`, or else at a half or two. `None` if there is
+    /// no scale other than 1 at which that is more probable than not.
     pub fn search(a: Grid<'_>, b: Grid<'_>, range: f64, parameters: &RegistrationParameters) -> Option<Self> {
         let rasters = Rasters::new(a, b, 1.0 + range, &parameters.search)?;
         let step = rasters.step();
         let most = ((1.0 + range).ln() / step).floor() as i32;
         let factors: Vec<f64> = (-most..=most).map(|number| (f64::from(number) * step).exp()).collect();
+        Self::near(a, b, range, (&rasters, &factors), parameters)
+            .or_else(|| Self::doubled(a, b, factors.len() + DOUBLINGS.len(), parameters))
+    }
+
+    /// Finds the scale at which two maps agree within the range, near one of `factors`.
+    fn near(
+        a: Grid<'_>,
+        b: Grid<'_>,
+        range: f64,
+        (rasters, factors): (&Rasters<'_>, &[f64]),
+        parameters: &RegistrationParameters,
+    ) -> Option<Self> {
         let significances: Vec<f64> = factors.par_iter().map(|factor| rasters.significance(*factor)).collect();
         // By chance a peak is as significant with probability `exp(-significance)`.
         let least = (factors.len() as f64 / BY_CHANCE).ln();
@@ -52,10 +66,10 @@ impl Scale {
         let tried = factors.len();
         let is_within = |factor: f64| factor.ln().abs() <= (1.0 + range).ln();
         let at = |factor: f64| is_within(factor).then(|| Self::at(a, b, factor, tried, parameters))?;
-        let better = |one: Self, other: Self| if other.log_odds() > one.log_odds() { other } else { one };
         let sharper = |one: Self, other: Self| if other.precision() > one.precision() { other } else { one };
-        let mut best = order.iter().take(LOOKED_AT).filter_map(|number| at(factors[*number])).reduce(better)?;
-        let mut step = 0.5 * step;
+        let mut best =
+            order.iter().take(LOOKED_AT).filter_map(|number| at(factors[*number])).reduce(Self::more_probable)?;
+        let mut step = 0.5 * rasters.step();
         while step > FINEST_STEP {
             let (smaller, larger) = rayon::join(|| at(best.factor * (-step).exp()), || at(best.factor * step.exp()));
             let last = best.factor;
@@ -66,6 +80,22 @@ impl Scale {
         let left = best.verdict.candidate.deformed.map(|deformed| best.factor * deformed.scale);
         let best = left.and_then(at).unwrap_or(best);
         (best.factor.ln().abs() > LEAST_ERROR).then_some(best)
+    }
+
+    /// Finds whether two maps agree with map b at half or at twice its size, which is not searched for the factors beside these.
+    fn doubled(a: Grid<'_>, b: Grid<'_>, tried: usize, parameters: &RegistrationParameters) -> Option<Self> {
+        let least = (DOUBLINGS.len() as f64 / BY_CHANCE).ln();
+        let is_significant = |factor: &f64| {
+            let rasters = Rasters::new(a, b, *factor, &parameters.search);
+            rasters.is_some_and(|rasters| rasters.significance(*factor) >= least)
+        };
+        let significant = DOUBLINGS.into_iter().filter(is_significant);
+        significant.filter_map(|factor| Self::at(a, b, factor, tried, parameters)).reduce(Self::more_probable)
+    }
+
+    /// The more probable of two scales; of equals the first.
+    fn more_probable(self, other: Self) -> Self {
+        if other.log_odds() > self.log_odds() { other } else { self }
     }
 
     /// Log-odds of the maps at this scale, before they are compared with those of other poses.
@@ -154,8 +184,14 @@ mod tests {
         let beyond = Scale::search(a, scaled(b, 1.0 / 0.88), 0.05, &parameters);
         assert!(beyond.is_none_or(|scale| scale.factor.ln().abs() <= 1.05_f64.ln()), "not beyond the range");
         assert!(Scale::search(a, b, 0.2, &parameters).is_none(), "the resolution is right");
+        for factor in DOUBLINGS {
+            let found = Scale::search(a, scaled(b, 1.0 / factor), 0.2, &parameters).unwrap();
+            assert_eq!(found.factor, factor);
+        }
         let another = FloorPlan::another_office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
         assert!(Scale::search(a, another.view().grid, 0.2, &parameters).is_none(), "another building");
+        let doubled = scaled(another.view().grid, 2.0);
+        assert!(Scale::search(a, doubled, 0.2, &parameters).is_none(), "another building at twice its size");
     }
 
     #[test]
