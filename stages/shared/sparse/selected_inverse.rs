@@ -71,8 +71,8 @@ fn invert(front: &Front, factored: &FactoredFront, parent: Option<(&Front, &[Blo
     for place in (0..own).rev() {
         let (column, diagonal) = (&factored.columns[place], &factored.inverses[place]);
         let mut below = BlockColumn::zeros(size - place - 1);
-        for other in place + 1..size {
-            below.subtract_product(&inverse[other], place + 1, &column.block(other - place));
+        for (other, of_other) in inverse.iter().enumerate().skip(place + 1) {
+            below.subtract_product(of_other, place + 1, &column.block(other - place));
         }
         below.multiply(0, diagonal);
         let of_rows = (0..below.len()).map(|row| below.block(row).tr_mul(&column.block(row + 1)));
