@@ -16,7 +16,7 @@ pub(super) struct Front {
     pub(super) rows: Vec<usize>,
     /// Fronts whose first row below is among the columns.
     pub(super) children: Vec<usize>,
-    /// Blocks of its columns that are not there by the joining of columns alone.
+    /// Number of blocks of its columns, without the zeros that joining columns has added.
     filled: usize,
 }
 
