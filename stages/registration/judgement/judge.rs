@@ -8,8 +8,9 @@ use crate::registration::pose_window::PoseWindow;
 use crate::registration::{Basis, Hypothesis};
 use crate::shared::geometry::Pose2;
 
-/// A deformation is refused where it differs from the allowed one in the centimetres in which both are shown, metres.
-const HALF_A_CENTIMETRE: f64 = 0.005;
+/// Deformations are shown in centimetres: one that exceeds the allowed one by no more than they are rounded by is not refused,
+/// metres.
+const ROUNDING: f64 = 0.005;
 
 /// What the user knows about a pair of robots.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -188,7 +189,7 @@ fn refusal(verdict: &Verdict, of_others: f64, parameters: &JudgementParameters) 
     }
     if *probability >= accept {
         let rms = candidate.deformed.map(|deformed| deformed.rms);
-        return rms.filter(|rms| rms - most > HALF_A_CENTIMETRE).map(|rms| Refusal::Deformed { rms, most });
+        return rms.filter(|rms| rms - most > ROUNDING).map(|rms| Refusal::Deformed { rms, most });
     }
     // The missing probability is that of other candidates, or of none of them.
     let of_none = 1.0 - probability - of_others;
