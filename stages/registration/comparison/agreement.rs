@@ -2,9 +2,8 @@
 
 use super::ComparisonParameters;
 use super::Details;
-use super::conflicts::points_of_walls;
 use super::regions::{ComparedWall, Finding, Found, Region, RegionComparison};
-use super::straight_walls::StraightWalls;
+use super::straight_walls::{StraightWalls, conflicting_walls};
 use crate::shared::deformation::Deformation;
 use crate::shared::geometry::{Grid, Point2, Pose2, is_known};
 use crate::shared::walls::WallMap;
@@ -57,9 +56,10 @@ pub struct Agreement {
     /// Conflict length: wall of one map on known free space of the other, farther from any wall than the tolerance,
     /// metres.
     pub conflict_length: f64,
-    /// Crossing length, a part of the conflict length: pieces at least as long as a door is wide, with no parallel
-    /// wall within 0.4 m beyond the tolerance, metres.
-    pub crossing_length: f64,
+    /// Number of straight walls on free space of the other map, of the map that has fewer, at most eight. Where only one map has
+    /// walls that the other has not, things were moved or one is drawn more roughly; where each has, it is another
+    /// place.
+    pub conflicting_walls: usize,
     /// Log-likelihood ratio of the walls: of the inliers and conflicts at this pose to those of a random pose.
     /// Regions are independent, and none counts for more than walls as long as its side.
     pub evidence: f64,
@@ -67,7 +67,7 @@ pub struct Agreement {
     /// any corner fits any other; only further walls confirm it.
     pub independent_share: f64,
     /// Number of independent constraints in the weaker of two directions: straight walls with inliers along the
-    /// longest one and across it, the fewer of both, at most four. 0 is degenerate: the position along the walls is
+    /// longest one and across it, the fewer of both, at most eight. 0 is degenerate: the position along the walls is
     /// open.
     pub constraints: usize,
     /// Local residual: by how much regions of map b are shifted to align with map a, root mean square over the
@@ -108,19 +108,15 @@ pub fn compare(
         compared.iter().filter(|wall| wall.of_b == of_b && wall.finding == finding).copied().collect()
     };
     let on_wall = found(true, Finding::Inlier);
-    let points = |walls: Vec<ComparedWall>| walls.iter().map(|wall| wall.point).collect::<Vec<_>>();
-    let [apart_of_a, apart_of_b] = [false, true].map(|of_b| points(found(of_b, Finding::Conflict)));
-    let across = |apart: &[Point2], walls: &WallMap| {
-        let spacing = walls.spacing;
-        points_of_walls(apart, spacing) as f64 * spacing
-    };
+    let conflicting =
+        |of_b: bool, map: &MapView<'_>| conflicting_walls(&found(of_b, Finding::Conflict), map.walls.spacing);
     let chance = (chance(a, tolerance) + chance(b, tolerance)) / 2.0;
     let (for_it, against_it) =
         ((INLIER_RATIO_OF_ONE_PLACE / chance).ln(), ((1.0 - INLIER_RATIO_OF_ONE_PLACE) / (1.0 - chance)).ln());
     let StraightWalls { independent_share, constraints } = StraightWalls::of(&on_wall, b.walls.spacing);
     let mut agreement = Agreement {
         overlap: overlap(a, b, transform_a_b),
-        crossing_length: 0.5 * (across(&apart_of_a, a.walls) + across(&apart_of_b, b.walls)),
+        conflicting_walls: conflicting(false, a).min(conflicting(true, b)),
         independent_share,
         constraints,
         residual: residual(&regions),
@@ -169,25 +165,21 @@ pub fn overlap(a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2) -> f64 {
 mod tests {
     use super::*;
     use crate::registration::judgement::JudgementParameters;
-    use crate::shared::geometry::pose;
-    use crate::shared::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, drawing, seen};
+    use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
 
     #[test]
-    fn crossing_walls_are_distinguished_from_walls_drawn_beside_at_any_resolution() {
-        for resolution in [0.05, 0.4] {
-            let fine = drawing(0.0, 0.0, 0.0);
-            let seen = seen(-1.0, -1.0, 21.0, 13.0);
-            let draw = |plan: FloorPlan| plan.draw(seen, Drawing { resolution, ..fine });
-            let (a, another) = (draw(FloorPlan::office()), draw(FloorPlan::another_office()));
-            let compared = |b: &DrawnMap, shift: f64| {
-                compare(&a.view(), &b.view(), &pose(shift, shift, 0.0), &JudgementParameters::default().comparison())
-            };
-            let tolerance = (1.5 * resolution).max(JudgementParameters::default().wall_tolerance);
-            let beside = compared(&a, tolerance + 0.2);
-            let other = compared(&another, 0.0);
-            assert!(beside.conflict_length > 5.0 && other.conflict_length > 5.0, "{beside:?} {other:?}");
-            let crossing = |agreement: &Agreement| agreement.crossing_length / agreement.conflict_length;
-            assert!(crossing(&beside) + 0.2 < crossing(&other), "{resolution}: {beside:?} {other:?}");
+    fn walls_that_one_map_has_and_the_other_has_not_are_no_walls_in_conflict() {
+        let draw = |plan: FloorPlan| plan.draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
+        let partitions = [[3.0, 3.2, 5.0, 3.2], [9.0, 8.8, 11.5, 8.8], [15.0, 2.9, 17.0, 2.9]];
+        let (plain, divided) = (draw(FloorPlan::office()), draw(FloorPlan::office().with(&partitions)));
+        let another = draw(FloorPlan::another_office());
+        let compared = |a: &DrawnMap, b: &DrawnMap| {
+            compare(&a.view(), &b.view(), &Pose2::identity(), &JudgementParameters::default().comparison())
+        };
+        for agreement in [compared(&plain, &divided), compared(&divided, &plain)] {
+            assert!(agreement.conflict_length > 2.0 && agreement.conflicting_walls == 0, "{agreement:?}");
         }
+        let agreement = compared(&plain, &another);
+        assert!(agreement.conflicting_walls > 1, "{agreement:?}");
     }
 }

@@ -7,7 +7,6 @@
 //! - [`Deformed`]: the same with map b deformed, where the maps contradict each other as they came.
 
 mod agreement;
-mod conflicts;
 mod deformed;
 mod details;
 mod parameters;

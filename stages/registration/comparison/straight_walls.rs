@@ -1,10 +1,13 @@
-//! Independent constraints on a pose from the walls that agree, counted in straight walls: neighbouring points of one
-//! wall are not independent.
+//! Straight walls: what agrees and what contradicts, counted in walls, as neighbouring points of one wall are not
+//! independent.
 //!
 //! Two walls that are not parallel fix a pose in all directions, as any corner fits any other corner. So the inliers
 //! on the two longest straight walls are no evidence that the pose is right; only the further inliers are. And
 //! parallel walls, as in a corridor or between rows of shelves, leave the position along them open: what counts is
 //! the number of walls across.
+//!
+//! What contradicts is counted in walls, too: a long one that is off by its room is one contradiction, and three
+//! short ones in different rooms are three.
 
 use super::regions::ComparedWall;
 use nalgebra::Vector2;
@@ -18,48 +21,54 @@ const SAME_DIRECTION: f64 = 0.985;
 const ANOTHER_DIRECTION: f64 = 0.707;
 /// Width of the strip that holds a straight wall: both of its sides, and its deformation, metres.
 const WIDTH: f64 = 0.3;
-/// Least length of inliers on a straight wall, metres.
-const LEAST_LENGTH: f64 = 0.5;
-/// More walls in a direction are no further evidence.
-const MOST_WALLS: usize = 4;
+/// Least length of inliers on a straight wall that confirms a pose, metres.
+const LEAST_AGREEING: f64 = 0.5;
+/// Least length of conflicts on a straight wall that contradicts a pose, metres: more than a piece of furniture has.
+const LEAST_CONFLICTING: f64 = 1.0;
+/// More walls in a direction are no further evidence for a pose, and more that contradict it none against it. Chosen
+/// by cross-validation, with the weights of the judgement: from 6 to 10 it hardly matters.
+const MOST_WALLS: usize = 8;
 
 /// Independent constraints from the inliers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct StraightWalls {
     /// Share of the inliers outside the two walls that fix the pose, 0 to 1; 0 if there are none.
     pub(super) independent_share: f64,
-    /// Number of straight walls along the longest one or across it, the fewer of both; at most four.
+    /// Number of straight walls along the longest one or across it, the fewer of both; at most eight.
     pub(super) constraints: usize,
 }
 
 impl StraightWalls {
-    /// Counts the straight walls among points that are `spacing` metres of wall each.
-    pub(super) fn of(walls: &[ComparedWall], spacing: f64) -> Self {
-        let strips = Strips::new(walls);
-        let mut left = vec![true; walls.len()];
-        let Some((_, longest)) = strips.of_most(|index| left[index]) else { return Self::default() };
-        let crosses = |index: usize| walls[index].normal.dot(&longest.normal).abs() < ANOTHER_DIRECTION;
-        longest.take_from(walls, &mut left);
-        let second = strips.of_most(|index| left[index] && crosses(index));
-        let is_beside = |index: usize| left[index] && !second.as_ref().is_some_and(|(_, one)| one.holds(&walls[index]));
-        let independent_share = (0..walls.len()).filter(|index| is_beside(*index)).count();
-        // The longest is one of those along it.
-        let (mut along, mut across) = (1, 0);
-        while along.min(across) < MOST_WALLS {
-            let Some((count, strip)) = strips.of_most(|index| left[index]) else { break };
-            if (count as f64) * spacing < LEAST_LENGTH {
+    /// Counts the straight walls among inliers that are `spacing` metres of wall each.
+    pub(super) fn of(inliers: &[ComparedWall], spacing: f64) -> Self {
+        let strips = Strips::new(inliers);
+        let mut all = strips.longest_first(spacing, LEAST_AGREEING);
+        let Some((longest, fixing)) = all.next() else { return Self::default() };
+        let (mut along, mut across, mut second) = (1, 0, 0);
+        for (strip, points) in all {
+            if strip.normal.dot(&longest.normal).abs() > ANOTHER_DIRECTION {
+                along += 1;
+            } else {
+                across += 1;
+                second = second.max(points);
+            }
+            if along.min(across) == MOST_WALLS {
                 break;
             }
-            strip.take_from(walls, &mut left);
-            let runs_along = strip.normal.dot(&longest.normal).abs() > ANOTHER_DIRECTION;
-            *(if runs_along { &mut along } else { &mut across }) += 1;
         }
-        Self { independent_share: independent_share as f64 / walls.len() as f64, constraints: along.min(across) }
+        let independent_share = (inliers.len() - fixing - second) as f64 / inliers.len() as f64;
+        Self { independent_share, constraints: along.min(across) }
     }
 }
 
+/// Number of straight walls on conflicts, which are `spacing` metres of wall each; at most eight.
+pub(super) fn conflicting_walls(conflicts: &[ComparedWall], spacing: f64) -> usize {
+    Strips::new(conflicts).longest_first(spacing, LEAST_CONFLICTING).take(MOST_WALLS).count()
+}
+
 /// Points of walls, by the direction of the wall.
-struct Strips {
+struct Strips<'a> {
+    walls: &'a [ComparedWall],
     directions: Vec<Direction>,
 }
 
@@ -71,8 +80,8 @@ struct Direction {
     offsets: Vec<(f64, usize)>,
 }
 
-impl Strips {
-    fn new(walls: &[ComparedWall]) -> Self {
+impl<'a> Strips<'a> {
+    fn new(walls: &'a [ComparedWall]) -> Self {
         let direction = |number: usize| {
             let (sine, cosine) = (PI * number as f64 / DIRECTIONS as f64).sin_cos();
             let normal = Vector2::new(cosine, sine);
@@ -82,7 +91,17 @@ impl Strips {
             offsets.sort_by(|one, other| one.0.total_cmp(&other.0));
             Direction { normal, offsets }
         };
-        Self { directions: (0..DIRECTIONS).map(direction).collect() }
+        Self { walls, directions: (0..DIRECTIONS).map(direction).collect() }
+    }
+
+    /// The strips that hold at least a length, metres, of points that no earlier one holds, and the number of these.
+    fn longest_first(&self, spacing: f64, least_length: f64) -> impl Iterator<Item = (Strip, usize)> {
+        let mut left = vec![true; self.walls.len()];
+        std::iter::from_fn(move || {
+            let (points, strip) = self.of_most(|index| left[index])?;
+            strip.take_from(self.walls, &mut left);
+            (points as f64 * spacing >= least_length).then_some((strip, points))
+        })
     }
 
     /// The strip that holds most of the requested points, and their number; none if there are none.
@@ -193,16 +212,27 @@ mod tests {
     }
 
     #[test]
-    fn doors_do_not_split_a_wall_and_more_than_four_walls_are_no_further_evidence() {
-        let rooms: Vec<ComparedWall> = (0..7)
+    fn doors_do_not_split_a_wall_and_more_than_eight_walls_are_no_further_evidence() {
+        let rooms: Vec<ComparedWall> = (0..9)
             .flat_map(|number| {
                 let x = 4.0 * f64::from(number);
                 [wall((x, 0.0), (x, 3.0)), wall((x, 4.0), (x, 7.0)), wall((x, 0.0), (x + 3.0, 0.0))].concat()
             })
             .collect();
-        assert_eq!(of(&rooms).constraints, 1, "one long wall with doors, and seven across");
+        assert_eq!(of(&rooms).constraints, 1, "one long wall with doors, and nine across");
         let shifted: Vec<ComparedWall> =
-            (0..7).flat_map(|row| wall((0.0, f64::from(row)), (28.0, f64::from(row)))).collect();
-        assert_eq!(of(&[rooms, shifted].concat()).constraints, 4);
+            (0..9).flat_map(|row| wall((0.0, f64::from(row)), (36.0, f64::from(row)))).collect();
+        assert_eq!(of(&[rooms, shifted].concat()).constraints, 8);
+    }
+
+    #[test]
+    fn conflicts_count_by_walls_and_not_by_metres() {
+        let count = |walls: &[ComparedWall]| conflicting_walls(walls, SPACING);
+        assert_eq!(count(&[]), 0);
+        assert_eq!(count(&wall((0.0, 0.0), (20.0, 0.0))), 1, "one long wall");
+        let rooms = [wall((0.0, 0.0), (1.2, 0.0)), wall((9.0, 4.0), (9.0, 5.2)), wall((3.0, 8.0), (4.2, 8.0))];
+        assert_eq!(count(&rooms.concat()), 3);
+        let chairs = [wall((0.0, 0.0), (0.5, 0.0)), wall((5.0, 2.0), (5.5, 2.0))];
+        assert_eq!(count(&chairs.concat()), 0);
     }
 }

@@ -209,10 +209,8 @@ fn refusal(verdict: &Verdict, of_others: f64, parameters: &JudgementParameters) 
     }
     let agreement = candidate.agreement;
     Some(match verdict.weakest_term() {
-        Term::Residual | Term::CrossingConflicts => Refusal::Contradiction { agreement },
-        Term::SmallComponents | Term::ShortSegments if agreement.details.contradict() => {
-            Refusal::Contradiction { agreement }
-        }
+        Term::ConflictingWalls => Refusal::Contradiction { agreement },
+        Term::ShortSegments if agreement.details.contradict() => Refusal::Contradiction { agreement },
         weakest => Refusal::Chance { agreement, weakest, probability: *probability, accept },
     })
 }

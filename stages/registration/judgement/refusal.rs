@@ -125,17 +125,17 @@ impl Refusal {
             Self::Chance { agreement, .. } if agreement.inlier_length < LITTLE_WALL => {
                 "at no pose do the maps agree on more than a few metres of wall".to_owned()
             }
-            Self::Chance { agreement, weakest: Term::IndependentInliers, .. } => {
-                let Agreement { inlier_length, independent_share, .. } = agreement;
-                let fixing = (1.0 - independent_share) * inlier_length;
-                format!(
-                    "{inlier_length:.0} m of wall agree, but {fixing:.0} m of them are one corner, which many rooms have"
-                )
-            }
             Self::Chance { agreement, .. } if agreement.constraints == 0 => {
                 format!(
                     "{:.0} m of wall agree, but all are parallel: the position along them is open",
                     agreement.inlier_length
+                )
+            }
+            Self::Chance { agreement, weakest: Term::Constraints, .. } => {
+                let Agreement { inlier_length, independent_share, .. } = agreement;
+                let fixing = (1.0 - independent_share) * inlier_length;
+                format!(
+                    "{inlier_length:.0} m of wall agree, but {fixing:.0} m of them are one corner, which many rooms have"
                 )
             }
             Self::Chance { agreement, weakest: Term::PeakSignificance, .. } => {

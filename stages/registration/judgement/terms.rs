@@ -11,11 +11,9 @@ const MOST_SIGNIFICANCE: f64 = 300.0;
 const LEAST_DEVIATION: f64 = 0.01;
 /// A larger common area is no further evidence, square metres.
 const MOST_AREA: f64 = 500.0;
-/// Added to the length of conflicts before taking a share of it, metres: a share of little wall is uncertain.
-const MORE_CONFLICT: f64 = 5.0;
 
 /// The number of terms.
-pub const COUNT: usize = 11;
+pub const COUNT: usize = 8;
 
 /// A term of the log-odds that a hypothesis is right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,16 +26,10 @@ pub enum Term {
     Deviation,
     /// Logarithm of the area that both maps know.
     CommonArea,
-    /// Share of the inliers outside the two walls that fix the pose.
-    IndependentInliers,
     /// Logarithm of the number of independent constraints in the weaker direction.
     Constraints,
-    /// Local residual, metres.
-    Residual,
-    /// Share of the conflict length that crosses free space.
-    CrossingConflicts,
-    /// Logarithm of the ratio of inliers to conflicts of small connected components.
-    SmallComponents,
+    /// Logarithm of the number of straight walls that contradict the other map, of the map that has fewer.
+    ConflictingWalls,
     /// Logarithm of the ratio of inliers to conflicts of short straight segments.
     ShortSegments,
     /// Root of the cost of the deformation.
@@ -51,11 +43,8 @@ impl Term {
         Self::MarginOverChance,
         Self::Deviation,
         Self::CommonArea,
-        Self::IndependentInliers,
         Self::Constraints,
-        Self::Residual,
-        Self::CrossingConflicts,
-        Self::SmallComponents,
+        Self::ConflictingWalls,
         Self::ShortSegments,
         Self::Deformation,
     ];
@@ -67,11 +56,8 @@ impl Term {
             Self::MarginOverChance => "margin over chance",
             Self::Deviation => "standard deviation of the position",
             Self::CommonArea => "common area",
-            Self::IndependentInliers => "independent inliers",
             Self::Constraints => "constraints in the weaker direction",
-            Self::Residual => "local residual",
-            Self::CrossingConflicts => "conflicts that are walls",
-            Self::SmallComponents => "furniture and pillars",
+            Self::ConflictingWalls => "walls in conflict",
             Self::ShortSegments => "short pieces of wall",
             Self::Deformation => "deformation",
         }
@@ -83,11 +69,9 @@ impl Term {
             Self::PeakSignificance
             | Self::MarginOverChance
             | Self::CommonArea
-            | Self::IndependentInliers
             | Self::Constraints
-            | Self::SmallComponents
             | Self::ShortSegments => 1.0,
-            Self::Deviation | Self::Residual | Self::CrossingConflicts | Self::Deformation => -1.0,
+            Self::Deviation | Self::ConflictingWalls | Self::Deformation => -1.0,
         }
     }
 }
@@ -105,27 +89,15 @@ impl Terms {
         agreement: &Agreement,
         deformation_cost: f64,
     ) -> Self {
-        let Agreement {
-            overlap,
-            conflict_length,
-            crossing_length,
-            independent_share,
-            constraints,
-            residual,
-            details,
-            ..
-        } = *agreement;
+        let Agreement { overlap, conflicting_walls, independent_share, constraints, details, .. } = *agreement;
         let confirmed = (independent_share / FULL_SHARE).min(1.0);
         Self([
             confirmed * significance.clamp(0.0, MOST_SIGNIFICANCE).ln_1p(),
             margin,
             (LEAST_DEVIATION + deviation).min(1.0).ln(),
             confirmed * overlap.clamp(1.0, MOST_AREA).ln(),
-            independent_share,
             (constraints as f64).ln_1p(),
-            residual,
-            crossing_length / (conflict_length + MORE_CONFLICT),
-            details.components.log_ratio(),
+            (conflicting_walls as f64).ln_1p(),
             details.segments.log_ratio(),
             deformation_cost.max(0.0).sqrt(),
         ])
