@@ -2,6 +2,7 @@
 
 use crate::status::BadUse;
 use gridweave_logs::names::Input;
+use gridweave_runtime::message::{FixedText, LONGEST_ROBOT_NAME};
 use std::path::{Path, PathBuf};
 
 /// Kind of the inputs of a run.
@@ -16,8 +17,13 @@ pub(crate) enum Inputs {
 }
 
 impl Inputs {
-    /// Finds the kind by the names of the files. Images of maps, and JSON files beside others, are errors.
+    /// Finds the kind by the names of the files. Images of maps, JSON files beside others, and robots with names that are
+    /// too long are errors.
     pub(crate) fn of(paths: &[PathBuf]) -> Result<Self, BadUse> {
+        let mut robots = paths.iter().filter_map(|path| Input::new(path).robot);
+        if let Some(error) = robots.find_map(|robot| FixedText::<LONGEST_ROBOT_NAME>::new(&robot).err()) {
+            return Err(BadUse(format!("the robot {error}")));
+        }
         if let Some(image) =
             paths.iter().find(|path| has_ending(path, &["pgm", "png", "pbm", "ppm", "bmp", "jpg", "jpeg"]))
         {
@@ -110,6 +116,16 @@ mod tests {
         let bag = folder.path().join("bag.yaml");
         std::fs::create_dir(&bag).unwrap();
         assert_eq!(of(&[bag.to_str().unwrap()]), Ok(Inputs::Logs));
+    }
+
+    #[test]
+    fn a_name_of_a_robot_that_is_too_long_is_an_error_for_logs_and_for_map_files() {
+        let (fits, longer) = ("r".repeat(64), "r".repeat(65));
+        for file in ["a.mcap", "a.yaml"] {
+            assert!(of(&[&format!("{fits}={file}"), file]).is_ok());
+            let error = of(&[file, &format!("{longer}={file}")]).unwrap_err();
+            assert!(error.contains(&longer) && error.contains("has 65 bytes, and at most 64 fit"), "{error}");
+        }
     }
 
     #[test]

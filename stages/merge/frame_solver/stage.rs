@@ -201,35 +201,32 @@ impl FrameSolver {
             return self.solve_and_send(output);
         }
         let reasons = reasons::of_pair(pair, &self.robots, &self.solution, &self.alignments);
+        let reasons = self.with_maps(reasons);
         self.solution.unmerged.extend(reasons);
-        self.explain_maps();
         self.send_all(output)
     }
 
-    /// Where a map cannot be used, that is why its robot is not merged; where others have maps and one has none, it has only tags.
-    fn explain_maps(&mut self) {
-        let is_aligned = |robot: &String| {
-            self.alignments
-                .values()
-                .any(|alignment| alignment.accepted && [&alignment.a, &alignment.b].contains(&robot))
-        };
-        let is_without_map = |robot: &String| {
-            !is_aligned(robot)
-                && !self.mapped.is_empty()
-                && !self.mapped.contains(robot)
-                && !self.unusable_maps.contains_key(robot)
-                && !self.lost.contains_key(robot)
-        };
-        for (robot, reason) in &mut self.solution.unmerged {
-            if is_without_map(robot) {
+    /// Reasons why robots are not merged, as alignments give them, with what is known of their maps: where a map cannot be
+    /// used, that is the reason; where others have maps and a robot has none, it has only tags.
+    fn with_maps(&self, mut reasons: BTreeMap<String, String>) -> BTreeMap<String, String> {
+        for (robot, reason) in &mut reasons {
+            if let Some(error) = self.unusable_maps.get(robot) {
+                *reason = format!("its map cannot be used: {error}");
+            } else if self.is_by_tags_alone(robot) {
                 *reason = format!("it has sent no map, and by its tags alone: {reason}");
             }
         }
-        for (robot, error) in &self.unusable_maps {
-            if let Some(reason) = self.solution.unmerged.get_mut(robot) {
-                *reason = format!("its map cannot be used: {error}");
-            }
-        }
+        reasons
+    }
+
+    /// Whether a robot has sent no map where others have, and is aligned with none.
+    fn is_by_tags_alone(&self, robot: &str) -> bool {
+        let is_of_robot = |alignment: &Alignment| alignment.a == robot || alignment.b == robot;
+        // There are as many alignments as pairs, so they are looked at last.
+        !self.mapped.is_empty()
+            && !self.mapped.contains(robot)
+            && !self.lost.contains_key(robot)
+            && !self.alignments.values().any(|alignment| alignment.accepted && is_of_robot(alignment))
     }
 
     fn finish(&mut self, output: &Output<Placement>) -> Result<(), StageError> {
@@ -272,7 +269,8 @@ impl FrameSolver {
             let lost = self.lost.iter().filter(|(robot, _)| !self.robots.contains(*robot));
             self.solution = solve(&self.robots, &self.alignments, reference, &self.parameters, &self.solution);
             self.solution.unmerged.extend(lost.map(|(robot, reason)| (robot.clone(), reason.clone())));
-            self.explain_maps();
+            let reasons = std::mem::take(&mut self.solution.unmerged);
+            self.solution.unmerged = self.with_maps(reasons);
         }
         self.send_all(output)
     }

@@ -80,6 +80,18 @@ fn a_robot_without_a_map_beside_those_with_maps_is_said_to_have_none() {
 }
 
 #[test]
+fn that_a_robot_has_no_map_is_said_once_however_many_alignments_are_refused() {
+    let mut run = Run::new(None);
+    run.map("robot1", "map");
+    run.map("robot3", "map");
+    run.align(&refused("robot1", "robot2", 0.1, "no tag in common"));
+    run.align(&refused("robot1", "robot3", 0.1, "no tag in common"));
+    run.align(&refused("robot1", "robot3", 0.2, "one tag in common"));
+    let reason = run.reason("robot2");
+    assert_eq!(reason.matches("it has sent no map").count(), 1, "{reason}");
+}
+
+#[test]
 fn an_initial_pose_of_a_robot_that_never_shows_up_is_a_warning() {
     let initial_poses = ["robot1", "robt2"].map(|robot| (robot.to_owned(), InitialPose::ORIGIN)).into();
     let mut run = Run::in_context(&Context { initial_poses, ..Default::default() });
