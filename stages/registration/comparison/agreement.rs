@@ -56,9 +56,9 @@ pub struct Agreement {
     /// Conflict length: wall of one map on known free space of the other, farther from any wall than the tolerance,
     /// metres.
     pub conflict_length: f64,
-    /// Number of straight walls on free space of the other map, of the map that has fewer, at most eight. Where only one map has
-    /// walls that the other has not, things were moved or one is drawn more roughly; where each has, it is another
-    /// place.
+    /// Number of straight walls on free space of the other map, of the map that has fewer, at most eight. Where only
+    /// one map has walls that the other has not, things were moved or one is drawn more roughly; where each has, it is
+    /// another place.
     pub conflicting_walls: usize,
     /// Log-likelihood ratio of the walls: of the inliers and conflicts at this pose to those of a random pose.
     /// Regions are independent, and none counts for more than walls as long as its side.

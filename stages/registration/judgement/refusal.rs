@@ -8,6 +8,8 @@ use std::fmt;
 const LITTLE_WALL: f64 = 4.0;
 /// Maps with a greater inlier ratio, which contradict each other all the same, do so in details.
 const MOST_OF_THE_WALLS: f64 = 0.7;
+/// Maps with a lesser share of inliers outside the two walls that fix the pose agree on one corner.
+const LITTLE_ELSE: f64 = 0.5;
 
 /// Why an alignment may not be used. The texts are for the user: [`headline`](Self::headline) and
 /// [`advice`](Self::advice) are short, and the display text has all details.
@@ -131,7 +133,7 @@ impl Refusal {
                     agreement.inlier_length
                 )
             }
-            Self::Chance { agreement, weakest: Term::Constraints, .. } => {
+            Self::Chance { agreement, weakest: Term::Constraints, .. } if agreement.independent_share < LITTLE_ELSE => {
                 let Agreement { inlier_length, independent_share, .. } = agreement;
                 let fixing = (1.0 - independent_share) * inlier_length;
                 format!(
@@ -261,5 +263,41 @@ impl fmt::Display for Listed {
             writeln!(text, "{listed}: {inlier_length:.0} m of wall agree, {conflict_length:.0} m do not")?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registration::comparison::Details;
+
+    #[test]
+    fn a_place_whose_long_walls_agree_and_whose_details_do_not_is_called_so() {
+        let segments = WallLengths { inlier: 3.0, conflict: 9.0 };
+        let agreement = |inlier_length: f64| Agreement {
+            inlier_length,
+            conflict_length: 20.0,
+            details: Details { segments, ..Details::default() },
+            ..Agreement::default()
+        };
+        let headline = |inlier_length: f64| Refusal::Contradiction { agreement: agreement(inlier_length) }.headline();
+        assert_eq!(headline(90.0), "the long walls agree, but of furniture and short walls 3 m do, 9 m do not");
+        assert_eq!(headline(25.0), "the maps contradict each other: 25 m of wall agree, 20 m do not");
+    }
+
+    #[test]
+    fn maps_that_agree_on_more_than_a_corner_are_not_said_to_agree_on_one() {
+        let headline = |independent_share: f64| {
+            let agreement = Agreement {
+                inlier_length: 11.0,
+                conflict_length: 2.0,
+                constraints: 2,
+                independent_share,
+                ..Agreement::default()
+            };
+            Refusal::Chance { agreement, weakest: Term::Constraints, probability: 0.8, accept: 0.98 }.headline()
+        };
+        assert_eq!(headline(0.1), "11 m of wall agree, but 10 m of them are one corner, which many rooms have");
+        assert_eq!(headline(0.6), "11 m of wall agree and 2 m contradict, which may be chance");
     }
 }

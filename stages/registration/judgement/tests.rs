@@ -1,7 +1,7 @@
 //! Comparison and judgement on drawn floor plans.
 
 use super::{JudgementParameters, Refusal, UserKnowledge, Verdict, judge};
-use crate::registration::comparison::{Agreement, Details, WallLengths, compare};
+use crate::registration::comparison::compare;
 use crate::registration::pose_window::PoseWindow;
 use crate::registration::{Basis, Hypothesis};
 use crate::shared::geometry::{Point2, Pose2, point_jacobian, pose};
@@ -367,20 +367,6 @@ fn hypotheses_at_one_pose_are_listed_once() {
     let known = UserKnowledge { hypothesis: Some(2), ..UserKnowledge::default() };
     let chosen = judged_knowing(&a, &b, &by_maps_alike(&[first, second, beside]), &known);
     assert_eq!((chosen.refusal, chosen.chosen), (None, Some((2, 2))));
-}
-
-#[test]
-fn a_place_whose_long_walls_agree_and_whose_details_do_not_is_called_so() {
-    let segments = WallLengths { inlier: 3.0, conflict: 9.0 };
-    let agreement = |inlier_length: f64| Agreement {
-        inlier_length,
-        conflict_length: 20.0,
-        details: Details { segments, ..Details::default() },
-        ..Agreement::default()
-    };
-    let headline = |inlier_length: f64| Refusal::Contradiction { agreement: agreement(inlier_length) }.headline();
-    assert_eq!(headline(90.0), "the long walls agree, but of furniture and short walls 3 m do, 9 m do not");
-    assert_eq!(headline(25.0), "the maps contradict each other: 25 m of wall agree, 20 m do not");
 }
 
 #[test]
