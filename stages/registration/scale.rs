@@ -79,7 +79,9 @@ impl Scale {
         // A deformation makes up for what is left, and shows it.
         let left = best.verdict.candidate.deformed.map(|deformed| best.factor * deformed.scale);
         let best = left.and_then(at).unwrap_or(best);
-        (best.factor.ln().abs() > LEAST_ERROR).then_some(best)
+        // At the end of the range the maps may agree better beyond it.
+        let is_inside = is_within(best.factor * (1.0 + LEAST_ERROR)) && is_within(best.factor / (1.0 + LEAST_ERROR));
+        (is_inside && best.factor.ln().abs() > LEAST_ERROR).then_some(best)
     }
 
     /// Finds whether two maps agree with map b at half or at twice its size, which is not searched for the factors beside these.

@@ -3,6 +3,7 @@
 pub mod deformation;
 pub mod geometry;
 pub mod log_odds;
+pub mod number_text;
 pub mod placement;
 pub mod robot_clock;
 pub mod robot_maps;

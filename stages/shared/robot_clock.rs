@@ -17,12 +17,13 @@ const FASTEST_CLOCK: f64 = 10.0;
 ///
 /// Usually the time of a message is its stamp. A clock that leaps (a simulation starts again, one message has a stamp of the
 /// future, a stamp is of another clock) goes on here as the log times do. A message without a stamp takes the time that has passed
-/// in the log since the last one with a stamp.
+/// in the log since the last one with a stamp; before any other, its log time, and the stamps that follow are put on the clock of
+/// the log if they are of another one.
 #[derive(Clone, Debug, Default)]
 pub struct RobotClock {
     /// The last message of each kind.
     last: BTreeMap<&'static str, Reading>,
-    /// The last message with a stamp.
+    /// The last message with a stamp, or else the first one.
     latest: Option<Reading>,
 }
 
@@ -33,6 +34,8 @@ struct Reading {
     log_time: LogTime,
     /// What was added to the stamp, nanoseconds.
     shift: i128,
+    /// Whether it has a stamp.
+    is_stamped: bool,
 }
 
 impl Reading {
@@ -74,7 +77,13 @@ impl RobotClock {
     pub fn time(&mut self, kind: &'static str, stamp: Time, log_time: LogTime) -> (LogTime, Option<Leap>) {
         let stamp = LogTime::from(stamp);
         if stamp == LogTime::MIN {
-            return (self.latest.map_or(log_time, |latest| latest.expected(log_time)), None);
+            let Some(latest) = self.latest else {
+                let reading = Reading { time: log_time, log_time, shift: 0, is_stamped: false };
+                self.last.insert(kind, reading);
+                self.latest = Some(reading);
+                return (log_time, None);
+            };
+            return (latest.expected(log_time), None);
         }
         let shifted = |shift: i128| LogTime(later(stamp, shift));
         let known = self.last.get(kind).copied();
@@ -83,7 +92,10 @@ impl RobotClock {
         let fits = |shift: &i128| match (&known, &self.latest) {
             (Some(last), _) => last.is_followed_by(shifted(*shift), log_time),
             // Of the first message of a kind, only another clock can be told.
-            (None, Some(latest)) => shifted(*shift).seconds_since(latest.expected(log_time)).abs() <= LONGEST_DELAY,
+            (None, Some(latest)) => {
+                let most = if latest.is_stamped { LONGEST_DELAY } else { LONGEST_DISORDER };
+                shifted(*shift).seconds_since(latest.expected(log_time)).abs() <= most
+            }
             (None, None) => true,
         };
         let reference = known.or(self.latest);
@@ -94,7 +106,7 @@ impl RobotClock {
                 (i128::from(expected.0) - i128::from(stamp.0), Some(Leap))
             }
         };
-        let reading = Reading { time: shifted(shift), log_time, shift };
+        let reading = Reading { time: shifted(shift), log_time, shift, is_stamped: true };
         self.last.insert(kind, reading);
         self.latest = Some(reading);
         (reading.time, leap)
@@ -132,6 +144,17 @@ mod tests {
         assert_eq!(times(&[("pose", 0.0, 105.0)]), (vec![105.0], 0));
         let messages = [("pose", 5.0, 105.0), ("scan", 0.0, 106.0), ("pose", 0.0, 107.0), ("pose", 8.0, 108.0)];
         assert_eq!(times(&messages), (vec![5.0, 6.0, 7.0, 8.0], 0));
+    }
+
+    #[test]
+    fn a_first_message_without_a_stamp_does_not_make_the_others_late() {
+        // A node has sent before the clock of the simulation ran.
+        let simulated = [("odometry", 0.0, 1e9), ("odometry", 50.0, 1e9 + 0.5), ("scan", 50.1, 1e9 + 0.6)];
+        assert_eq!(times(&simulated), (vec![1e9, 1e9 + 0.5, 1e9 + 0.6], 1));
+        let other_kind = [("odometry", 0.0, 1e9), ("scan", 50.0, 1e9 + 0.5), ("odometry", 50.1, 1e9 + 0.6)];
+        assert_eq!(times(&other_kind), (vec![1e9, 1e9 + 0.5, 1e9 + 0.6], 1));
+        let same_clock = [("odometry", 0.0, 1e9), ("scan", 1e9 + 0.4, 1e9 + 0.5), ("odometry", 1e9 + 0.6, 1e9 + 0.6)];
+        assert_eq!(times(&same_clock), (vec![1e9, 1e9 + 0.4, 1e9 + 0.6], 0));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use gridweave_runtime::ros::{
     DecodeError, Header, LaserEcho, LaserScan, MultiEchoLaserScan, RangeScan, RosMessage, TFMessage, decode,
 };
 use gridweave_runtime::stage::frame_of_robot;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 
 /// Transforms scans to the base frame, by the mounting poses of lidars.
@@ -18,8 +18,8 @@ pub(crate) struct Scans {
     set: LidarPoses,
 }
 
-/// The poses of lidars on the bases of their robots, by robot: x, y, yaw, metres and radians.
-pub type LidarPoses = BTreeMap<String, [f64; 3]>;
+/// The poses of lidars on the bases of their robots, by robot: x, y, yaw and, if it is not 0, roll; metres and radians.
+pub type LidarPoses = BTreeMap<String, Vec<f64>>;
 
 impl Scans {
     /// Creates a transformer for robots with the base frame `base`, or one of the usual names. The poses `set` take the
@@ -47,7 +47,11 @@ impl Scans {
     pub(crate) fn to_base_frame(&self, robot: &str, scan: LaserScan) -> RangeScan {
         let frame = || scan.header.frame_id.clone();
         let (base, transform_base_lidar) = match self.set.get(robot) {
-            Some(&[x, y, yaw]) => (frame(), Isometry3::new(Vector3::new(x, y, 0.0), Vector3::z() * yaw)),
+            Some(set) => {
+                let [x, y, yaw, roll] = std::array::from_fn(|place| set.get(place).copied().unwrap_or(0.0));
+                let rotation = UnitQuaternion::from_euler_angles(roll, 0.0, yaw);
+                (frame(), Isometry3::from_parts(Translation3::new(x, y, 0.0), rotation))
+            }
             None => {
                 let mount = self.mounts.mount(robot, &scan.header.frame_id);
                 mount.unwrap_or_else(|NoTransform| (frame(), Isometry3::identity()))
@@ -140,11 +144,15 @@ mod tests {
         let found = scans.to_base_frame("r1", scan("r1/laser"));
         assert!(found.yaw.abs() < 1e-9);
         assert_eq!((found.angle_min, found.angle_increment), (1.0, -0.5));
+        let set = Scans::new(None, LidarPoses::from([("r1".to_owned(), vec![0.1, 0.0, 0.5, PI])]));
+        let found = set.to_base_frame("r1", scan("r1/laser"));
+        assert!((found.yaw - 0.5).abs() < 1e-9 && found.x == 0.1);
+        assert_eq!((found.angle_min, found.angle_increment), (1.0, -0.5));
     }
 
     #[test]
     fn a_scan_in_the_base_frame_needs_no_mount_and_a_lidar_in_an_unknown_frame_is_the_base() {
-        let scans = Scans::new(None, LidarPoses::from([("r2".to_owned(), [0.1, -0.2, 0.5])]));
+        let scans = Scans::new(None, LidarPoses::from([("r2".to_owned(), vec![0.1, -0.2, 0.5])]));
         assert!(scans.knows_mount("r1", "r1/base_footprint") && !scans.knows_mount("r1", "r1/laser"));
         assert_eq!(scans.to_base_frame("r1", scan("r1/base_footprint")).x, 0.0);
         let found = scans.to_base_frame("r1", scan("r1/laser"));

@@ -55,7 +55,7 @@ pub struct SourceParameters {
     /// (`two_classes`). Maps of another convention are sent as map servers write them.
     pub map_values: CellValues,
     /// The poses of lidars on the bases of their robots, as `{ ROBOT = [X, Y, YAW] }`, metres and radians, in place of those
-    /// in tf.
+    /// in tf. A fourth number is the roll: pi for a lidar that is mounted upside down.
     pub lidars: LidarPoses,
     /// Start, in seconds after the first message of the logs. The latest map of each robot before that, and other
     /// latched messages, are sent at the start.
@@ -100,6 +100,10 @@ impl Parameters for SourceParameters {
         }
         if self.end.is_some_and(|end| end <= self.start) {
             errors.push(ParameterError::new("end", "must be later than `start`"));
+        }
+        if self.lidars.values().any(|pose| !matches!(pose.len(), 3 | 4) || pose.iter().any(|value| !value.is_finite()))
+        {
+            errors.push(ParameterError::new("lidars", "must be [X, Y, YAW] or [X, Y, YAW, ROLL] for each robot"));
         }
         errors
     }

@@ -45,7 +45,8 @@ pub(crate) struct RunOptions {
     /// The side of a cell of a robot's map file, metres, instead of the resolution in the file.
     #[arg(long, value_name = "ROBOT=METRES")]
     pub(crate) resolution: Vec<String>,
-    /// The pose of a robot's lidar on its base, metres and radians, instead of that in the log's tf.
+    /// The pose of a robot's lidar on its base, metres and radians, instead of that in the log's tf. A fourth number is the
+    /// roll: 3.1416 for a lidar that is mounted upside down.
     #[arg(long, value_name = "ROBOT=X,Y,YAW", allow_hyphen_values = true)]
     pub(crate) lidar: Vec<String>,
     #[command(flatten)]

@@ -31,10 +31,10 @@ pub(super) fn lidars(job: &Job<'_>) -> Result<Table, BadUse> {
     if !job.inputs.is_empty() && job.kind != Inputs::Logs {
         return Err(BadUse("--lidar is for logs with scans, and the inputs are others".to_owned()));
     }
-    read(job, "lidar", &job.options.lidar, "ROBOT=X,Y,YAW in metres and radians", |pose| {
+    read(job, "lidar", &job.options.lidar, "ROBOT=X,Y,YAW or ROBOT=X,Y,YAW,ROLL in metres and radians", |pose| {
         let number = |text: &str| text.trim().parse().ok().filter(|value: &f64| value.is_finite()).map(Value::Float);
         let numbers: Vec<Value> = pose.split(',').map(number).collect::<Option<_>>()?;
-        (numbers.len() == 3).then_some(Value::Array(numbers))
+        matches!(numbers.len(), 3 | 4).then_some(Value::Array(numbers))
     })
 }
 

@@ -29,8 +29,8 @@ pub struct ScanBeams {
 }
 
 impl ScanBeams {
-    /// Extracts the beams of a scan. Ranges below the lidar's minimum or not a number are left out; those above its
-    /// maximum, or infinite, have hit nothing (REP 117). `None` if the scan is invalid.
+    /// Extracts the beams of a scan. Ranges below the lidar's minimum or not a number are left out; those of
+    /// its maximum, as many drivers report where nothing is, above it, or infinite, have hit nothing (REP 117). `None` if the scan is invalid.
     pub fn of(scan: &RangeScan, parameters: &ScanMapperParameters) -> Option<Self> {
         let RangeScan { x, y, yaw, angle_min, angle_increment, time_increment, .. } = *scan;
         let numbers = [x, y, yaw, angle_min, angle_increment, time_increment];
@@ -43,7 +43,7 @@ impl ScanBeams {
         let seen = |range: f64| match range {
             range if range < nearest.max(f64::MIN_POSITIVE) => None,
             range if range.is_nan() => None,
-            range if range > farthest || range.is_infinite() => {
+            range if range >= farthest || range.is_infinite() => {
                 let free = parameters.free_without_echo.min(parameters.max_range).min(farthest);
                 (free > 0.0).then_some((free, false))
             }

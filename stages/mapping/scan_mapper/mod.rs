@@ -18,6 +18,7 @@
 //! - [`ScanMap`]: the growing map.
 
 mod beams;
+mod continuous_odometry;
 mod parameters;
 mod robot;
 mod scan_map;
@@ -28,6 +29,8 @@ mod stage;
 mod test_drive;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod trouble_tests;
 
 pub use beams::{BaseBeam, ScanBeams};
 pub use parameters::{MappingMode, ScanMapperParameters};

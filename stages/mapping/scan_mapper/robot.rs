@@ -1,5 +1,6 @@
 //! One robot with its scans and poses.
 
+use super::continuous_odometry::ContinuousOdometry;
 use super::scan_odometry::ScanOdometry;
 use super::slam_map::{LostScans, SlamMap};
 use super::{ScanBeams, ScanMap, ScanMapperParameters, TooLarge};
@@ -44,12 +45,16 @@ pub(super) struct Robot {
     localization: Localization,
     poses: PoseTrack,
     odometry: PoseTrack,
+    /// What the track of odometry is made of.
+    continuous: ContinuousOdometry,
     /// All of odometry, where poses are sent at the end.
     kept_odometry: Vec<(LogTime, Pose2)>,
     /// The frame of the poses.
     pub(super) frame: Option<String>,
     waiting: VecDeque<(LogTime, ScanBeams)>,
     first_scan: Option<LogTime>,
+    /// Number of scans so far.
+    scans: usize,
     /// Times of the first and the last scan in the map.
     pub(super) drawn: Option<[LogTime; 2]>,
     /// Time of the last scan in the map that was sent.
@@ -63,10 +68,12 @@ impl Robot {
             localization: Localization::NotYet,
             poses: PoseTrack::default(),
             odometry: PoseTrack::default(),
+            continuous: ContinuousOdometry::default(),
             kept_odometry: Vec::new(),
             frame: None,
             waiting: VecDeque::new(),
             first_scan: None,
+            scans: 0,
             drawn: None,
             sent_until: None,
         }
@@ -75,6 +82,7 @@ impl Robot {
     /// Adds a scan with its time.
     pub(super) fn add_scan(&mut self, time: LogTime, scan: ScanBeams) {
         self.first_scan.get_or_insert(time);
+        self.scans += 1;
         self.waiting.push_back((time, scan));
     }
 
@@ -92,17 +100,35 @@ impl Robot {
         self.poses.add(time, position(pose))
     }
 
-    /// Adds a pose by odometry, and keeps it if `is_kept`. Returns `false` if it is late, or comes after the start of the
-    /// map without it.
-    pub(super) fn add_odometry(&mut self, time: LogTime, pose: &Pose2, is_kept: bool) -> bool {
-        if matches!(self.localization, Localization::ByScans(..)) {
-            return false;
+    /// Adds a pose by odometry, and keeps it if `is_kept`. Returns it, without the leaps of odometry so far; `None` if it is
+    /// late, or comes after the start of the map without it.
+    pub(super) fn add_odometry(&mut self, time: LogTime, pose: &Pose2, is_kept: bool) -> Option<Pose2> {
+        let is_late = self.odometry.latest_time().is_some_and(|latest| time < latest);
+        if is_late || matches!(self.localization, Localization::ByScans(..)) {
+            return None;
         }
-        let is_used = self.odometry.add(time, position(pose));
-        if is_used && is_kept && !matches!(self.localization, Localization::ByPoses(_)) {
-            self.kept_odometry.push((time, *pose));
+        let pose = self.continuous.follow(time, pose);
+        self.odometry.add(time, position(&pose));
+        if is_kept && !matches!(self.localization, Localization::ByPoses(_)) {
+            self.kept_odometry.push((time, pose));
         }
-        is_used
+        Some(pose)
+    }
+
+    /// Seconds from the first scan to the first leap of odometry, if it has leapt.
+    pub(super) fn odometry_leap(&self) -> Option<f64> {
+        Some(self.continuous.first_leap()?.seconds_since(self.first_scan?))
+    }
+
+    /// Number of its scans, if they are registered along odometry that has never moved.
+    pub(super) fn scans_at_a_standstill(&self) -> Option<usize> {
+        let is_by_odometry = matches!(self.localization, Localization::ByOdometry(_));
+        (is_by_odometry && self.continuous.stands_still()).then_some(self.scans)
+    }
+
+    /// Number of its scans, if there are any and none is in a map.
+    pub(super) fn unused_scans(&self) -> Option<usize> {
+        (self.drawn.is_none() && self.scans > 0).then_some(self.scans)
     }
 
     /// Takes the odometry that was kept.
@@ -213,6 +239,11 @@ impl Robot {
                 (slam.map().snapshot(), left_out)
             }
         }
+    }
+
+    /// Whether its scans turn against its odometry.
+    pub(super) fn is_mirrored(&self) -> bool {
+        self.slam_map().is_some_and(SlamMap::is_mirrored)
     }
 
     /// Whether its scans lie so seldom on each other that there is no map of them.

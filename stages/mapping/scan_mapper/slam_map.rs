@@ -162,6 +162,11 @@ impl SlamMap {
         start * pose(place.x, place.y, moved.rotation.angle() + turned * share)
     }
 
+    /// Whether the scans turn against odometry, as those of a lidar that is mounted upside down.
+    pub(super) fn is_mirrored(&self) -> bool {
+        self.trajectory.turns_against_odometry()
+    }
+
     /// Whether so many scans lie on no others that there is no map of them.
     pub(super) fn lost(&self) -> Option<LostScans> {
         let (unmatched, scans) = (self.trajectory.unmatched(), self.scans.len());

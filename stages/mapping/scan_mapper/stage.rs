@@ -31,6 +31,12 @@ pub fn kind() -> StageKind {
     .build()
 }
 
+/// Why the map of a robot would be mirrored.
+const UPSIDE_DOWN: &str = "its scans turn against its odometry, as those of a lidar that is mounted upside down. Log its mount on \
+                           /tf_static with a roll of 180 degrees, or give it: --lidar ROBOT=X,Y,YAW,ROLL with a roll of 3.1416";
+/// From so many scans on a robot has probably moved.
+const SCANS_OF_A_DRIVE: usize = 50;
+
 struct ScanMapper {
     parameters: ScanMapperParameters,
     robots: BTreeMap<String, Robot>,
@@ -99,10 +105,11 @@ impl ScanMapper {
         let (time, leap) = robot.clock.time("odometry", message.header.stamp, message.log_time());
         warn_of_leap(message.robot(), leap, output);
         let pose = message.pose.pose.planar();
-        if !is_finite(&pose) || !robot.add_odometry(time, &pose, is_offline) {
+        let followed = is_finite(&pose).then(|| robot.add_odometry(time, &pose, is_offline)).flatten();
+        let Some(pose) = followed else {
             output.warn(format!("odometry of {} that is not finite or late is left out", message.robot()));
             return Ok(());
-        }
+        };
         robot.decide(&parameters, false);
         self.draw_and_send(message.robot(), false, output)?;
         match self.robots.get(message.robot()).filter(|_| !is_offline) {
@@ -194,10 +201,10 @@ impl ScanMapper {
                 lost.scans,
                 lost.since.seconds_since(first)
             );
-            output.warn(format!("no map of {name}: {reason}"));
-            let reason = format!("it has no map: {reason}");
-            output.lost.send(name, &UnmergedRobot { robot: name.to_owned(), reason })?;
-            return Ok(());
+            return send_lost(name, &reason, output);
+        }
+        if robot.is_mirrored() {
+            return send_lost(name, UPSIDE_DOWN, output);
         }
         for (time, odometry) in robot.take_odometry() {
             send_pose(name, robot, time, &odometry, output)?;
@@ -212,17 +219,48 @@ impl ScanMapper {
                 robot.decide(&self.parameters, true);
             }
             self.draw_and_send(&name, true, output)?;
-            let is_empty =
-                |robot: &mut Robot| robot.drawn.is_some() && robot.lost().is_none() && robot.map().0.is_none();
-            if self.robots.get_mut(&name).is_some_and(is_empty) {
-                output.warn(format!(
-                    "no map of {name} was drawn: its scans show nothing within {} m",
-                    self.parameters.max_range
-                ));
+            if let Some(robot) = self.robots.get_mut(&name) {
+                explain(&name, robot, &self.parameters, output)?;
             }
         }
         Ok(())
     }
+}
+
+/// Why a robot has no map, or a small one, at the end.
+fn explain(
+    name: &str,
+    robot: &mut Robot,
+    parameters: &ScanMapperParameters,
+    output: &Output<Drawn>,
+) -> Result<(), StageError> {
+    if let Some(seconds) = robot.odometry_leap() {
+        output.warn(format!(
+            "the odometry of {name} leaps, for the first time {seconds:.1} s after its first scan, as where its driver starts \
+             again: the robot is taken to be where it was"
+        ));
+    }
+    if let Some(scans) = robot.scans_at_a_standstill().filter(|scans| *scans >= SCANS_OF_A_DRIVE) {
+        output.warn(format!(
+            "the odometry of {name} stands still, so that only the first of {scans} scans is used. If the robot moved, leave its \
+             odometry out: --rename '/{{robot}}/odom=/{{robot}}/unused'"
+        ));
+    }
+    if let Some(scans) = robot.unused_scans() {
+        let reason = format!("none of its {scans} scans is used, as there is no pose of it for their times");
+        return send_lost(name, &reason, output);
+    }
+    if robot.drawn.is_some() && robot.lost().is_none() && robot.map().0.is_none() {
+        let reason = format!("its scans show nothing within {} m", parameters.max_range);
+        return send_lost(name, &reason, output);
+    }
+    Ok(())
+}
+
+/// Sends the reason why a robot has no map.
+fn send_lost(name: &str, reason: &str, output: &Output<Drawn>) -> Result<(), StageError> {
+    output.warn(format!("no map of {name}: {reason}"));
+    output.lost.send(name, &UnmergedRobot { robot: name.to_owned(), reason: format!("it has no map: {reason}") })
 }
 
 fn warn_of_leap(name: &str, leap: Option<Leap>, output: &Output<Drawn>) {

@@ -9,24 +9,24 @@ use gridweave_runtime::ros::{
 };
 use gridweave_runtime::stage::StageHarness;
 
-struct Bench(StageHarness);
+pub(super) struct Bench(pub(super) StageHarness);
 
 impl Bench {
-    fn new(parameters: &str) -> Self {
+    pub(super) fn new(parameters: &str) -> Self {
         Self(StageHarness::new(&kind(), parameters).unwrap())
     }
 
-    fn scan(&mut self, seconds: f64, scan: &RangeScan) {
+    pub(super) fn scan(&mut self, seconds: f64, scan: &RangeScan) {
         self.0.give::<RangeScan>("scan", "robot1", at(seconds), scan).unwrap();
     }
 
-    fn pose(&mut self, port: &str, frame: &str, seconds: f64, pose: Pose2) {
+    pub(super) fn pose(&mut self, port: &str, frame: &str, seconds: f64, pose: Pose2) {
         let stamped = PoseStamped { header: Header::new(at(seconds), frame), pose: pose.into() };
         self.0.give::<PoseWithCovarianceStamped>(port, "robot1", at(seconds), &stamped.into()).unwrap();
     }
 
     /// Finishes the stage. The last map, and how many were sent.
-    fn map(&mut self, seconds: f64) -> (Option<Message>, usize) {
+    pub(super) fn map(&mut self, seconds: f64) -> (Option<Message>, usize) {
         self.0.finish(at(seconds)).unwrap();
         let mut maps = self.0.take_messages("map");
         let count = maps.len();
@@ -35,15 +35,15 @@ impl Bench {
 }
 
 /// What is drawn: how far the occupied cells lie from the walls (the mean and the greatest), and how many are free.
-struct Drawn {
-    mean: f64,
-    greatest: f64,
-    occupied: usize,
-    free: usize,
+pub(super) struct Drawn {
+    pub(super) mean: f64,
+    pub(super) greatest: f64,
+    pub(super) occupied: usize,
+    pub(super) free: usize,
 }
 
 /// Measures a map with the given pose of its frame in the building.
-fn measure(map: &Message, transform_building_map: &Pose2) -> Drawn {
+pub(super) fn measure(map: &Message, transform_building_map: &Pose2) -> Drawn {
     let map: OccupancyGrid<'_> = map.decode().unwrap();
     let grid = Grid::new(GridGeometry::from(&map.info), map.cells()).unwrap();
     let off: Vec<f64> =
@@ -295,7 +295,7 @@ fn offline_all_poses_and_the_map_come_at_the_end() {
 }
 
 #[test]
-fn a_scan_too_far_away_and_scans_that_come_late_do_not_cost_the_map() {
+fn a_leap_of_odometry_and_scans_that_come_late_do_not_cost_the_map() {
     let mut bench = Bench::new("mode = 'offline'");
     for tick in 0..120 {
         let seconds = 0.1 * f64::from(tick);
@@ -312,9 +312,10 @@ fn a_scan_too_far_away_and_scans_that_come_late_do_not_cost_the_map() {
     assert_eq!(count, 1);
     let drawn = measure(&map.unwrap(), &Pose2::identity());
     assert!(drawn.mean < CELL && drawn.greatest < 4.0 * CELL, "{} {}", drawn.mean, drawn.greatest);
-    assert!(bench.0.warnings().keys().any(|warning| warning.contains("too large")), "{:?}", bench.0.warnings());
+    let warnings = bench.0.warnings();
+    assert!(warnings.keys().any(|warning| warning.contains("leaps, for the first time 11.0 s")), "{warnings:?}");
     let poses: Vec<PoseWithCovarianceStamped> = bench.0.take("pose").unwrap();
-    assert!(poses.iter().all(|pose| pose.pose.pose.position.x.is_finite()));
+    assert!(poses.iter().all(|pose| pose.pose.pose.position.x.abs() < 10.0));
 }
 
 #[test]
@@ -322,7 +323,7 @@ fn scans_that_lie_on_no_others_give_a_warning_and_no_map() {
     let mut bench = Bench::new("mode = 'offline'");
     for tick in 0..80 {
         let seconds = f64::from(tick);
-        bench.pose("odometry", "robot1/odom", seconds, pose(40.0 * seconds, 0.0, 0.0));
+        bench.pose("odometry", "robot1/odom", seconds, pose(15.0 * seconds, 0.0, 0.0));
         let header = Header::new(at(seconds), "robot1/base_link");
         bench.scan(seconds, &RangeScan { header, time_increment: 0.0, ..scan(0.1 * seconds) });
     }

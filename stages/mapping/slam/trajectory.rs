@@ -78,6 +78,11 @@ impl Trajectory {
         self.unmatched
     }
 
+    /// Whether the robot turns one way by odometry and the other way by its scans.
+    pub fn turns_against_odometry(&self) -> bool {
+        self.noise.turns_against_scans()
+    }
+
     /// Adds a scan of a robot that has moved by `moved` since the last one, by odometry. Returns whether a loop
     /// closure has moved earlier scans.
     pub fn add(&mut self, moved: &Pose2, points: Vec<ScanPoint>) -> bool {

@@ -15,6 +15,11 @@ use gridweave_runtime::stage::{
 };
 use std::collections::{BTreeMap, BTreeSet};
 
+/// Up to so many verdicts, each change is sent. Of more, a message is sent once at least one in [`FEW_CHANGED`] of the
+/// alignments has changed: else hundreds of robots would send the verdicts on all pairs hundreds of times.
+const FEW_VERDICTS: usize = 1000;
+const FEW_CHANGED: usize = 10;
+
 /// The kind `frame_solver`.
 pub fn kind() -> StageKind {
     StageKind::stage(
@@ -70,7 +75,8 @@ impl Outputs for Placement {
                 "/verdicts",
                 "verdicts",
                 "the last alignment of every pair, whether it is used, and whether others confirm it; sent after the \
-                 frames, and at the end, if it has changed",
+                 frames, and at the end, if it has changed; with more than 1000 pairs, if a tenth of the alignments has, and at \
+                 the end",
             ),
         }
     }
@@ -98,6 +104,8 @@ struct FrameSolver {
     sent: Option<RobotFrames>,
     tree: Tree,
     sent_verdicts: Vec<Verdict>,
+    /// How many alignments have changed since verdicts were sent.
+    changed_alignments: usize,
 }
 
 impl FrameSolver {
@@ -118,6 +126,7 @@ impl FrameSolver {
             sent: None,
             tree: Tree::default(),
             sent_verdicts: Vec::new(),
+            changed_alignments: 0,
         }
     }
 
@@ -189,6 +198,7 @@ impl FrameSolver {
         if before.as_ref() == self.alignments.get(&pair) {
             return Ok(());
         }
+        self.changed_alignments += 1;
         match are_known && is_refused && before.is_none_or(|before| !before.accepted) {
             true => self.explain_and_send(&pair, output),
             false => self.solve_and_send(output),
@@ -276,7 +286,8 @@ impl FrameSolver {
     }
 
     fn send_all(&mut self, output: &Output<Placement>) -> Result<(), StageError> {
-        match self.send(output, false)? {
+        let is_due = |changed, all| all <= FEW_VERDICTS || FEW_CHANGED * changed >= all;
+        match self.send(output, false)? && is_due(self.changed_alignments, self.alignments.len()) {
             true => self.send_verdicts(output),
             false => Ok(()),
         }
@@ -338,6 +349,7 @@ impl FrameSolver {
             let message = Verdicts { header, verdicts };
             output.verdicts.send("", &message)?;
             self.sent_verdicts = message.verdicts;
+            self.changed_alignments = 0;
         }
         Ok(())
     }

@@ -2,6 +2,7 @@
 
 use super::first_guess::LocalFrame;
 use super::{FirstGuess, IcpParameters, Registration};
+use crate::shared::number_text::beside_bound;
 use gridweave_runtime::covariance_ellipse::CovarianceEllipse;
 use nalgebra::Matrix2;
 
@@ -25,7 +26,8 @@ pub enum IcpRefusal {
     /// The position is degenerate along a direction.
     #[error(
         "the walls do not constrain the position along a bare corridor that runs at {direction:.0} degrees: its standard \
-         deviation is {deviation:.2} m, and {most:.2} m are allowed (max_deviation)"
+         deviation is {} m, and {} m are allowed (max_deviation)",
+        beside_bound(*deviation, *most, 2)[0], beside_bound(*deviation, *most, 2)[1]
     )]
     OpenPosition {
         /// The degenerate direction, degrees in map a, from -90 to 90.
@@ -38,7 +40,8 @@ pub enum IcpRefusal {
     /// The rotation is degenerate.
     #[error(
         "the walls do not constrain the rotation: its standard deviation is {degrees:.1} degrees, which moves walls by \
-         {deviation:.2} m, and {most:.2} m are allowed (max_deviation)"
+         {} m, and {} m are allowed (max_deviation)",
+        beside_bound(*deviation, *most, 2)[0], beside_bound(*deviation, *most, 2)[1]
     )]
     OpenRotation {
         /// Standard deviation, degrees.

@@ -15,7 +15,7 @@ use crate::shared::walls::{NORMAL_RADIUS, WallsOnDemand};
 use gridweave_runtime::ros::{Alignment, Evidence, Header, OccupancyGrid};
 use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError};
 use nalgebra::Matrix3;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// The scale is searched if no more pairs are to be.
 const MOST_SCALED: usize = 6;
@@ -49,7 +49,8 @@ pub(super) struct MergeVerifier {
     knowledge: Knowledge,
     maps: RobotMaps<WallsOnDemand>,
     gatherer: HypothesisGatherer,
-    hypotheses: BTreeMap<Origin, Vec<Alignment>>,
+    /// By pair and source.
+    hypotheses: BTreeMap<RobotPair, BTreeMap<String, Vec<Alignment>>>,
     /// Comparisons of the maps of each pair, with the numbers of both maps.
     comparisons: BTreeMap<RobotPair, ((u64, u64), Comparisons)>,
     /// Peaks of a search, for pairs whose hypotheses come from other sources.
@@ -89,7 +90,7 @@ impl MergeVerifier {
         if !self.maps.keep(&map, output, |_| WallsOnDemand::new()) {
             return Ok(());
         }
-        let pairs: BTreeSet<RobotPair> = self.pairs().filter(|pair| pair.concerns(map.robot())).cloned().collect();
+        let pairs: Vec<RobotPair> = self.pairs().filter(|pair| pair.concerns(map.robot())).cloned().collect();
         pairs.iter().try_for_each(|pair| self.update(pair, output))
     }
 
@@ -100,9 +101,8 @@ impl MergeVerifier {
     ) -> Result<(), StageError> {
         match self.gatherer.add(alignment.into_content()) {
             Ok(None) => Ok(()),
-            Ok(Some((origin, hypotheses))) => {
-                let pair = origin.pair.clone();
-                self.hypotheses.insert(origin, hypotheses);
+            Ok(Some((Origin { pair, source }, hypotheses))) => {
+                self.hypotheses.entry(pair.clone()).or_default().insert(source, hypotheses);
                 self.update(&pair, output)
             }
             Err(missing) => {
@@ -117,9 +117,9 @@ impl MergeVerifier {
     pub(super) fn finish(&mut self, output: &Output<Judgements>) -> Result<(), StageError> {
         let changed = self.self_similarities.forget_former(|robot| self.maps.get(robot).map(|map| map.number));
         let is_concerned = |pair: &&RobotPair| changed.iter().any(|robot| pair.concerns(robot));
-        let concerned: BTreeSet<RobotPair> = self.pairs().filter(is_concerned).cloned().collect();
+        let concerned: Vec<RobotPair> = self.pairs().filter(is_concerned).cloned().collect();
         concerned.iter().try_for_each(|pair| self.update(pair, output))?;
-        let pairs: BTreeSet<RobotPair> = self.pairs().cloned().collect();
+        let pairs: Vec<RobotPair> = self.pairs().cloned().collect();
         for pair in pairs {
             let Some(missing) = self.maps.missing(&pair) else { continue };
             let proposed = proposed(&self.hypotheses, &pair);
@@ -164,9 +164,9 @@ impl MergeVerifier {
         Ok(())
     }
 
-    /// The pairs with any hypothesis, once for each source.
+    /// The pairs with any hypothesis.
     fn pairs(&self) -> impl Iterator<Item = &RobotPair> {
-        self.hypotheses.keys().map(|origin| &origin.pair)
+        self.hypotheses.keys()
     }
 
     /// Judges a pair, and sends the verdict and the evidence if they have changed.
@@ -260,9 +260,11 @@ fn scale_reason(scale: &Scale, pair: &RobotPair, cell: f64) -> String {
 }
 
 /// All hypotheses of a pair, by source and rank.
-fn proposed<'a>(hypotheses: &'a BTreeMap<Origin, Vec<Alignment>>, pair: &RobotPair) -> Vec<&'a Alignment> {
-    let of_pair = hypotheses.iter().filter(|(origin, _)| origin.pair == *pair);
-    of_pair.flat_map(|(_, hypotheses)| hypotheses).collect()
+fn proposed<'a>(
+    hypotheses: &'a BTreeMap<RobotPair, BTreeMap<String, Vec<Alignment>>>,
+    pair: &RobotPair,
+) -> Vec<&'a Alignment> {
+    hypotheses.get(pair).into_iter().flat_map(BTreeMap::values).flatten().collect()
 }
 
 fn view(map: &RobotMap<WallsOnDemand>) -> MapView<'_> {

@@ -1,5 +1,7 @@
 //! Why maps cannot be aligned.
 
+use crate::shared::number_text::beside_bound;
+
 /// Why there is no hypothesis for two maps. The texts are for the user.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SearchRefusal {
@@ -40,8 +42,9 @@ pub enum SearchRefusal {
     NoFitInWindow,
     /// Too little wall in common.
     #[error(
-        "the maps have too little in common: {length:.0} m of wall agree at the best pose\nmissing: {least:.0} m of wall \
-         (min_wall_length)\ntry: let one robot drive where the other was, or let both see one tag"
+        "the maps have too little in common: {} m of wall agree at the best pose\nmissing: at least {} m of wall \
+         (min_wall_length)\ntry: let one robot drive where the other was, or let both see one tag",
+        beside_bound(*length, *least, 0)[0], beside_bound(*length, *least, 0)[1]
     )]
     TooLittleInCommon {
         /// Inlier length, metres.

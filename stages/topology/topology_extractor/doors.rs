@@ -14,8 +14,11 @@ pub fn doors(clearances: &[f64], max_width: f64, widening: f64) -> Vec<usize> {
             None => widest = widest.max(*clearance),
             Some(least) if *clearance < clearances[least] => narrowest = Some(step),
             Some(least) if *clearance >= clearances[least] * widening => {
-                if 2.0 * clearances[least] <= max_width {
-                    found.push(middle(clearances, least));
+                let middle = middle(clearances, least);
+                // A stretch that is hardly wider may reach back to the door before.
+                let is_another = found.last().is_none_or(|last| middle > *last);
+                if 2.0 * clearances[least] <= max_width && is_another {
+                    found.push(middle);
                 }
                 (widest, narrowest) = (*clearance, None);
             }
@@ -31,4 +34,20 @@ fn middle(clearances: &[f64], narrowest: usize) -> usize {
     let first = clearances[..narrowest].iter().rposition(is_wider).map_or(0, |wider| wider + 1);
     let behind = clearances[narrowest..].iter().position(is_wider).map_or(clearances.len(), |wider| narrowest + wider);
     (first + behind.max(1) - 1) / 2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn doors_follow_each_other_along_the_path(
+            clearances in prop::collection::vec(0.0..1.0_f64, 0..60), widening in 1.0..2.0_f64, is_least in any::<bool>(),
+        ) {
+            let found = doors(&clearances, 1.6, if is_least { 1.0 } else { widening });
+            prop_assert!(found.is_sorted_by(|one, next| one < next) && found.iter().all(|door| *door < clearances.len()));
+        }
+    }
 }

@@ -11,6 +11,9 @@ use gridweave_runtime::ros::{Alignment, Header, TopologicalMap};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 use std::collections::BTreeMap;
 
+/// Paths that are matched for each node, at most: a map on a floor has less than three, as its paths hardly cross.
+const PATHS_FOR_EACH_NODE: usize = 3;
+
 /// Outputs of the stage.
 pub(super) struct Matches {
     alignment: Out<Alignment>,
@@ -89,6 +92,15 @@ impl TopologyMatcher {
                 "the topological maps have {} and {} nodes, and at most {most} are matched (max_nodes)",
                 a.nodes.len(),
                 b.nodes.len()
+            );
+            return output.alignment.send("", &Alignment { reason, ..of_pair });
+        }
+        let most = PATHS_FOR_EACH_NODE * most;
+        if a.paths.len().max(b.paths.len()) > most {
+            let reason = format!(
+                "the topological maps have {} and {} paths, and at most {most} are matched ({PATHS_FOR_EACH_NODE} for each of max_nodes)",
+                a.paths.len(),
+                b.paths.len()
             );
             return output.alignment.send("", &Alignment { reason, ..of_pair });
         }

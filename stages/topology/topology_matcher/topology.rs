@@ -2,13 +2,14 @@
 
 use crate::shared::geometry::Point2;
 use gridweave_runtime::ros::TopologicalMap;
+use std::collections::BTreeSet;
 
 /// The nodes of a topological map and the straight paths between them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Topology {
     /// Positions of the nodes in the map frame, metres.
     pub nodes: Vec<Point2>,
-    /// Each by the numbers of its two nodes.
+    /// Each by the numbers of its two nodes. Paths between the same two are one: they are compared by their ends.
     pub paths: Vec<[usize; 2]>,
 }
 
@@ -47,6 +48,8 @@ impl Topology {
             }
             paths.push(ends.map(|node| node as usize));
         }
+        let mut known = BTreeSet::new();
+        paths.retain(|&[start, end]| known.insert([start.min(end), start.max(end)]));
         Ok(Self { nodes, paths })
     }
 

@@ -235,6 +235,23 @@ fn a_verdict_contains_the_reason_of_the_alignment() {
 }
 
 #[test]
+fn the_verdicts_on_many_pairs_are_not_sent_for_each_robot() {
+    let mut run = Run::new(Some("robot1"));
+    let (robots, mut sent) = (100, 0);
+    for b in 1..=robots {
+        run.map(&format!("robot{b}"), "map");
+        for a in 1..b {
+            run.align(&refused(&format!("robot{a}"), &format!("robot{b}"), 0.1, &format!("{a} and {b}")));
+        }
+        let messages: Vec<Verdicts> = run.stage.take("verdicts").unwrap();
+        sent += messages.iter().map(|message| message.verdicts.len()).sum::<usize>();
+    }
+    let pairs = robots * (robots - 1) / 2;
+    assert_eq!(run.verdicts().len(), pairs);
+    assert!(sent < 15 * pairs, "{sent} verdicts on {pairs} pairs");
+}
+
+#[test]
 fn verdicts_are_sent_after_frames_and_at_the_end_if_they_have_changed() {
     let mut run = Run::new(None);
     run.map("robot1", "map");

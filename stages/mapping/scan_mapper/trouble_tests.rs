@@ -1,0 +1,103 @@
+//! Robots whose odometry, clock or lidar is not as it should be.
+
+use super::test_drive::{CELL, at, scan, still_ranges, truth};
+use super::tests::{Bench, measure};
+use crate::shared::geometry::Pose2;
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::{Header, PoseStamped, PoseWithCovarianceStamped, RangeScan, UnmergedRobot};
+
+/// A scan of one moment.
+fn still(seconds: f64) -> RangeScan {
+    RangeScan { time_increment: 0.0, ranges: still_ranges(seconds), ..scan(seconds) }
+}
+
+/// Drives for half a minute, with odometry and scans as they are changed.
+fn drive(odometry: impl Fn(f64) -> Pose2, changed: impl Fn(RangeScan) -> RangeScan) -> Bench {
+    let mut bench = Bench::new("mode = 'offline'");
+    for tick in 0..300 {
+        let seconds = 0.1 * f64::from(tick);
+        bench.pose("odometry", "robot1/odom", seconds, odometry(seconds));
+        bench.scan(seconds, &changed(still(seconds)));
+    }
+    bench
+}
+
+fn warns(bench: &mut Bench, of: &str) -> bool {
+    bench.0.warnings().keys().any(|warning| warning.contains(of))
+}
+
+/// Why robot1 has no map.
+fn lost(bench: &mut Bench) -> Vec<String> {
+    let lost: Vec<UnmergedRobot> = bench.0.take("lost").unwrap();
+    lost.into_iter().map(|lost| lost.reason).collect()
+}
+
+#[test]
+fn odometry_that_starts_again_goes_on_where_it_was() {
+    let restart = truth(14.95).inverse();
+    let mut bench =
+        drive(|seconds| if seconds < 14.95 { truth(seconds) } else { restart * truth(seconds) }, |scan| scan);
+    let drawn = measure(&bench.map(30.0).0.unwrap(), &Pose2::identity());
+    assert!(drawn.mean < CELL && drawn.greatest < 8.0 * CELL, "{} {}", drawn.mean, drawn.greatest);
+    assert!(warns(&mut bench, "the odometry of robot1 leaps, for the first time 15.0 s after its first scan"));
+}
+
+#[test]
+fn of_a_lidar_that_is_upside_down_no_mirrored_map_is_drawn() {
+    let upside_down = |scan: RangeScan| RangeScan {
+        yaw: -scan.yaw,
+        y: -scan.y,
+        angle_min: -scan.angle_min,
+        angle_increment: -scan.angle_increment,
+        ..scan
+    };
+    let mut bench = drive(truth, upside_down);
+    assert!(bench.map(30.0).0.is_none());
+    let reasons = lost(&mut bench);
+    assert!(reasons.len() == 1 && reasons[0].contains("turn against its odometry"), "{reasons:?}");
+}
+
+#[test]
+fn odometry_that_never_moves_is_reported() {
+    let mut bench = drive(|_| truth(3.0), |scan| scan);
+    bench.map(30.0);
+    assert!(warns(&mut bench, "the odometry of robot1 stands still, so that only the first of 300 scans is used"));
+}
+
+#[test]
+fn a_range_of_the_longest_that_the_lidar_reports_is_no_wall() {
+    let nothing = |scan: RangeScan| {
+        let ranges = scan.ranges.iter().map(|range| if *range > 3.0 { 3.0 } else { *range });
+        RangeScan { range_max: 3.0, ranges: ranges.collect(), ..scan }
+    };
+    let mut bench = drive(truth, nothing);
+    let drawn = measure(&bench.map(30.0).0.unwrap(), &Pose2::identity());
+    assert!(drawn.mean < CELL && drawn.greatest < 4.0 * CELL, "{} {}", drawn.mean, drawn.greatest);
+}
+
+#[test]
+fn a_first_message_without_a_stamp_does_not_cost_the_map() {
+    let mut bench = Bench::new("mode = 'offline'");
+    for tick in 0..300 {
+        let seconds = 0.1 * f64::from(tick);
+        let (log_time, simulated) = (at(1e6 + seconds), at(seconds));
+        let stamp = if tick == 0 { LogTime::MIN } else { simulated };
+        let odometry = PoseStamped { header: Header::new(stamp, "robot1/odom"), pose: truth(seconds).into() };
+        bench.0.give::<PoseWithCovarianceStamped>("odometry", "robot1", log_time, &odometry.into()).unwrap();
+        let header = Header::new(simulated, "robot1/base_link");
+        bench.0.give::<RangeScan>("scan", "robot1", log_time, &RangeScan { header, ..still(seconds) }).unwrap();
+    }
+    let drawn = measure(&bench.map(1e6 + 30.0).0.unwrap(), &Pose2::identity());
+    assert!(drawn.mean < CELL && drawn.occupied > 500, "{} {}", drawn.mean, drawn.occupied);
+}
+
+#[test]
+fn a_robot_none_of_whose_scans_has_a_pose_is_reported() {
+    let mut bench = Bench::new("mode = 'offline'");
+    // A localizer that has begun long after the scans.
+    bench.pose("pose", "robot1/map", 500.0, truth(0.0));
+    (0..30).map(f64::from).for_each(|seconds| bench.scan(seconds, &still(seconds)));
+    assert!(bench.map(500.0).0.is_none());
+    let reasons = lost(&mut bench);
+    assert!(reasons.len() == 1 && reasons[0].contains("as there is no pose of it for their times"), "{reasons:?}");
+}
