@@ -1,5 +1,5 @@
-//! Code that several modules share: poses, grids and their walls, deformations, the last map of each robot, and buildings for
-//! tests.
+//! Code that several modules share: poses, grids and their walls, deformations, the last map of each robot, and
+//! buildings for tests.
 
 pub mod deformation;
 pub mod geometry;
