@@ -5,15 +5,14 @@
 //! 3. [`registration`]: hypotheses from the maps alone, their refinement, and the judgement of all;
 //! 4. [`merge`]: one pose for each robot, and one map.
 //!
-//! [`published`] holds methods of other authors, [`simulator`] and [`python_stage`] are stages of their own, and
-//! [`shared`] is what the rooms have in common. A stage is a folder: the algorithm as plain functions on slices and
-//! nalgebra types, and beside it `stage.rs`, the thin adapter that turns messages into calls.
+//! [`simulator`] and [`python_stage`] are stages of their own, and [`shared`] is what the rooms have in common. A stage is
+//! a folder: the algorithm as plain functions on slices and nalgebra types, and beside it `stage.rs`, the thin adapter
+//! that turns messages into calls.
 
 #![forbid(unsafe_code)]
 
 pub mod mapping;
 pub mod merge;
-pub mod published;
 pub mod python_stage;
 pub mod registration;
 pub mod shared;
@@ -28,7 +27,6 @@ pub fn kinds() -> Vec<StageKind> {
     let mut kinds = vec![python_stage::kind(), simulator::kind()];
     kinds.extend(mapping::kinds());
     kinds.extend(merge::kinds());
-    kinds.extend(published::kinds());
     kinds.extend(registration::kinds());
     kinds.extend(tags::kinds());
     kinds.extend(topology::kinds());

@@ -32,17 +32,11 @@ pub const PIPELINES: &[Shipped] = &[
         "merge by tags and maps; the maps must confirm each result (run by `gridweave merge` on logs)"
     ),
     shipped!("cut", "cut a time range or some topics out of logs"),
-    shipped!(
-        "group_mapping",
-        "merge as Saeedi et al. 2014: Radon transforms, Voronoi edges, entropy filter (to compare)"
-    ),
-    shipped!("hough_spectrum", "merge as Carpin 2008: Hough spectra (to compare)"),
     shipped!("live", "merge by tags while the robots explore"),
     shipped!("live_merge", "merge by tags and maps while the robots explore"),
     shipped!("map_file_merge", "merge map files (run by `gridweave merge` on map files)"),
     shipped!("map_files_to_log", "write map files as a log that the other pipelines read"),
     shipped!("map_merge", "map-only merge"),
-    shipped!("random_walk", "merge as Birk and Carpin 2006: random walks (to compare)"),
     shipped!(
         "scan_merge",
         "build maps from scans, then merge (run by `gridweave merge` where robots have scans and no map)"

@@ -6,12 +6,10 @@
 // An error in a bench ends it.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-mod building;
-
-use building::draw_deformed;
 use gridweave_stages::merge::elastic_refiner::{Body, ElasticRefinerParameters, refine, sharpness};
 use gridweave_stages::registration::search::{MapAlignerParameters, NamedMap, align_maps};
 use gridweave_stages::shared::geometry::{Grid, GridGeometry, Pose2, pose};
+use gridweave_stages::shared::test_world::building::draw_deformed;
 use gridweave_stages::shared::walls::{NORMAL_RADIUS, WallMap};
 use std::time::Instant;
 

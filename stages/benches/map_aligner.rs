@@ -5,11 +5,9 @@
 // An error in a bench ends it.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-mod building;
-
-use building::draw;
 use gridweave_stages::registration::search::{MapAlignerParameters, NamedMap, align_maps};
 use gridweave_stages::shared::geometry::Grid;
+use gridweave_stages::shared::test_world::building::draw;
 use std::time::Instant;
 
 const RUNS: usize = 7;

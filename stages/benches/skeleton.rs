@@ -5,9 +5,8 @@
 // An error in a bench ends it.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-mod building;
-
 use gridweave_stages::shared::geometry::Grid;
+use gridweave_stages::shared::test_world::building;
 use gridweave_stages::topology::skeleton::{DistanceMap, FreeSpace, Skeleton, SkeletonGraph, SkeletonParameters};
 use std::time::Instant;
 

@@ -1,4 +1,5 @@
-//! Code that several modules share: poses, grids and their walls, deformations, and the last map of each robot.
+//! Code that several modules share: poses, grids and their walls, deformations, the last map of each robot, and
+//! buildings for tests.
 
 pub mod deformation;
 pub mod geometry;
@@ -10,6 +11,5 @@ pub mod robot_maps;
 pub mod robot_pair;
 pub mod scan_grid;
 pub(crate) mod sparse;
-#[cfg(test)]
-pub(crate) mod test_world;
+pub mod test_world;
 pub mod walls;

@@ -1,6 +1,6 @@
 //! Pipelines are compared on the same logs, and whatever becomes of a run is a result.
 
-use crate::support::{Ended, SMALL_BUILDING, gridweave, simulate};
+use crate::support::{Ended, SMALL_BUILDING, gridweave, published, published_pipeline, simulate};
 use gridweave_logs::map_file::{self, GridMap};
 use gridweave_runtime::ros::MapMetaData;
 use serde_json::{Value, json};
@@ -25,7 +25,11 @@ fn compare(folder: &Path, args: &[&str]) -> Ended {
 
 /// What `--json` has printed.
 fn compared(folder: &Path, args: &[&str]) -> Value {
-    let ended = compare(folder, &[args, &["--json"]].concat());
+    json_of(&compare(folder, &[args, &["--json"]].concat()))
+}
+
+/// The JSON that a command has printed.
+fn json_of(ended: &Ended) -> Value {
     ended.assert(0, &[]);
     serde_json::from_str(&ended.stdout).unwrap()
 }
@@ -42,7 +46,7 @@ fn every_pipeline_is_run_on_every_log_and_reported_in_the_given_order() {
     let args = [
         "--pipelines",
         "tag_only",
-        "hough_spectrum",
+        "topological",
         "--inputs",
         "logs",
         "--seeds",
@@ -54,7 +58,7 @@ fn every_pipeline_is_run_on_every_log_and_reported_in_the_given_order() {
     ];
     let output = compared(folder.path(), &args);
     let expected =
-        ["tag_only", "hough_spectrum"].map(|pipeline| ["one", "two", "all"].map(|log| (pipeline.into(), log.into())));
+        ["tag_only", "topological"].map(|pipeline| ["one", "two", "all"].map(|log| (pipeline.into(), log.into())));
     assert_eq!(named(&output["rows"]), expected.concat());
     let runs = output["runs"].as_array().unwrap();
     let seeds: Vec<u64> = runs.iter().map(|run| run["seed"].as_u64().unwrap()).collect();
@@ -146,7 +150,9 @@ fn pairs_of_map_files_are_measured_at_the_places_that_they_have_in_common() {
     let pair = |name: &str, common: &Value| json!({"pair": name, "a": "day1", "b": "day2", "common": common});
     let pairs = json!([pair("rooms", &json!(common)), pair("nothing", &json!([]))]);
     fs::write(folder.path().join("pairs.json"), pairs.to_string()).unwrap();
-    let output = compared(folder.path(), &["--pipelines", "hough_spectrum", "--inputs", "."]);
+    let pipeline = published_pipeline("hough_spectrum");
+    let args = ["compare", "--pipelines", &pipeline, "--inputs", ".", "--json"];
+    let output = json_of(&published(folder.path(), &args));
     assert_eq!(
         named(&output["rows"]),
         ["rooms", "nothing", "all"].map(|log| ("hough_spectrum".to_owned(), log.to_owned()))
@@ -155,7 +161,7 @@ fn pairs_of_map_files_are_measured_at_the_places_that_they_have_in_common() {
     assert_eq!((&robot["robot"], &robot["outcome"]), (&json!("day2"), &json!("right")), "{output}");
     assert!(robot["error_m"].as_f64().unwrap() < 0.1 && robot["error_deg"].as_f64().unwrap() < 0.5, "{robot}");
     assert_eq!(output["runs"][1]["robots"][0]["outcome"], "wrong", "they are merged, and have nothing in common");
-    let brief = compared(folder.path(), &["--pipelines", "hough_spectrum", "--inputs", ".", "--by", "input"]);
+    let brief = json_of(&published(folder.path(), &[&args[..], &["--by", "input"]].concat()));
     assert_eq!(named(&brief["rows"]), [("hough_spectrum".to_owned(), ".".to_owned())]);
 }
 

@@ -1,6 +1,6 @@
 //! The pipeline `group_mapping` merges what it can, and says how surely.
 
-use crate::support::{gridweave, simulate};
+use crate::support::{gridweave, published, published_pipeline, simulate};
 use serde_json::Value;
 use std::fs;
 use tempfile::TempDir;
@@ -11,8 +11,9 @@ fn a_building_that_two_robots_have_seen_is_merged_by_directions_and_edges() {
     let folder = folder.path();
     let world = ["--robots", "2", "--seed", "2", "--set", "overlap=0.9", "--set", "drift=0", "--set", "tags=0"];
     simulate(folder, "in.mcap", &world);
-    let run = ["run", "group_mapping", "--input", "in.mcap", "--output", "out.mcap", "--summary", "summary.json"];
-    gridweave(folder, &run).assert(0, &["merged 2 of 2"]);
+    let pipeline = published_pipeline("group_mapping");
+    let run = ["run", &pipeline, "--input", "in.mcap", "--output", "out.mcap", "--summary", "summary.json"];
+    published(folder, &run).assert(0, &["merged 2 of 2"]);
     let summary: Value = serde_json::from_slice(&fs::read(folder.join("summary.json")).unwrap()).unwrap();
     let alignment = &summary["alignments"][0];
     assert_eq!(alignment["method"], "radon+edges");
@@ -30,8 +31,8 @@ fn robots_of_which_one_has_seen_nothing_are_not_merged() {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
     simulate(folder, "in.mcap", &["--robots", "2", "--seed", "2", "--set", "tags=0"]);
-    let run =
-        ["run", "group_mapping", "--input", "in.mcap", "--output", "out.mcap", "--set", "radon.min_similarity=1.0"];
-    gridweave(folder, &run)
+    let pipeline = published_pipeline("group_mapping");
+    let run = ["run", &pipeline, "--input", "in.mcap", "--output", "out.mcap", "--set", "radon.min_similarity=1.0"];
+    published(folder, &run)
         .assert(3, &["not merged: robot2", "of what they have in common at the best of four rotations"]);
 }

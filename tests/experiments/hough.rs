@@ -6,7 +6,7 @@ use crate::results::Results;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use gridweave::table::Table;
-use gridweave_stages::published::hough_spectrum_aligner::{HoughSpectrum, WallCells, correlate_spectra, rotations};
+use gridweave_published::hough_spectrum_aligner::{HoughSpectrum, WallCells, correlate_spectra, rotations};
 use gridweave_stages::registration::search::NamedMap;
 use gridweave_stages::shared::geometry::{Grid, GridGeometry};
 use std::path::PathBuf;

@@ -6,7 +6,7 @@ use crate::results::Results;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use gridweave::table::Table;
-use gridweave_stages::published::radon_aligner::{QuarterEnergy, WallPoints, energy};
+use gridweave_published::radon_aligner::{QuarterEnergy, WallPoints, energy};
 use gridweave_stages::shared::geometry::{Grid, GridGeometry};
 use std::path::PathBuf;
 

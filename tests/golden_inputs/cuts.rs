@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// The input of one case.
 #[derive(Clone, Copy)]
 pub(crate) struct Cut {
-    /// The stage kind, a folder of `tests/golden`.
+    /// The stage kind, a folder of golden cases.
     pub(crate) kind: &'static str,
     /// The case, a folder in it.
     pub(crate) name: &'static str,

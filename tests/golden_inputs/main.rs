@@ -1,4 +1,5 @@
-//! Writes the inputs of the golden cases, `tests/golden/KIND/CASE/input.mcap`:
+//! Writes the inputs of the golden cases, `KIND/CASE/input.mcap` in `tests/golden`, and in the crate of the published methods those
+//! of its stages:
 //!
 //!     cargo run -p gridweave-tests --bin golden_inputs             # those that are made up
 //!     cargo run -p gridweave-tests --bin golden_inputs -- --cuts   # and those that are cut out of a simulated log
@@ -25,28 +26,39 @@ fn main() {
         ["--cuts"] => true,
         _ => panic!("usage: golden_inputs [--cuts]"),
     };
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden");
     let scratch = tempfile::tempdir().unwrap();
     let made = scratch.path().join("input.mcap");
     for case in cases::made_up() {
         case.write(&made);
-        keep(&made, folder.join(case.kind).join(case.name));
+        keep(&made, &input(case.kind, case.name));
     }
     if with_cuts {
         let merge = cuts::Merge::new(scratch.path());
         for cut in cuts::CUTS {
             merge.write(&cut, &made);
-            keep(&made, folder.join(cut.kind).join(cut.name));
+            keep(&made, &input(cut.kind, cut.name));
         }
     }
 }
 
-/// Makes the file the input of the case in a folder, unless that holds the same messages.
-fn keep(made: &Path, folder: PathBuf) {
-    let input = folder.join("input.mcap");
-    if !input.exists() || cases::messages(&input) != cases::messages(made) {
-        fs::create_dir_all(&folder).unwrap();
-        fs::copy(made, &input).unwrap();
+/// The folders of golden cases: of the stages that ship, and of the published methods.
+fn golden() -> [PathBuf; 2] {
+    ["golden", "../pipelines/examples/published/golden"]
+        .map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder))
+}
+
+/// The input of the case of a stage kind.
+fn input(kind: &str, case: &str) -> PathBuf {
+    let [shipped, published] = golden();
+    let is_published = gridweave_published::kinds().iter().any(|published| published.name == kind);
+    if is_published { published } else { shipped }.join(kind).join(case).join("input.mcap")
+}
+
+/// Makes a file the input of a case, unless that holds the same messages.
+fn keep(made: &Path, input: &Path) {
+    if !input.exists() || cases::messages(input) != cases::messages(made) {
+        fs::create_dir_all(input.parent().unwrap()).unwrap();
+        fs::copy(made, input).unwrap();
         println!("wrote {}", input.display());
     }
 }

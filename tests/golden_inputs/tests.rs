@@ -1,12 +1,9 @@
 //! The inputs of the golden cases are those that the program `golden_inputs` makes.
 
 use crate::cases::{made_up, messages};
+use crate::{golden, input};
 use std::fs;
 use std::path::{Path, PathBuf};
-
-fn golden() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("golden")
-}
 
 /// All files below a folder.
 fn files(folder: &Path) -> Vec<PathBuf> {
@@ -20,7 +17,7 @@ fn what_is_made_up_is_what_the_program_makes() {
     let folder = tempfile::tempdir().unwrap();
     let made = folder.path().join("input.mcap");
     for case in made_up() {
-        let input = golden().join(case.kind).join(case.name).join("input.mcap");
+        let input = input(case.kind, case.name);
         case.write(&made);
         let (here, expected) = (messages(&input), messages(&made));
         let differs = here.iter().zip(&expected).position(|(here, expected)| here != expected);
@@ -37,12 +34,12 @@ fn what_is_made_up_is_what_the_program_makes() {
 
 #[test]
 fn every_input_is_made_up_or_a_cut() {
-    for input in files(&golden()).iter().filter(|path| path.ends_with("input.mcap")) {
+    for input in golden().iter().flat_map(|folder| files(folder)).filter(|path| path.ends_with("input.mcap")) {
         let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
         let folder = input.parent().unwrap();
         let (case, kind) = (name(folder), name(folder.parent().unwrap()));
         let is_made_up = made_up().iter().any(|made| (made.kind, made.name) == (kind.as_str(), case.as_str()));
         assert!(is_made_up || case == "simulated", "nothing makes {}", input.display());
-        assert!(!messages(input).is_empty(), "{} is empty", input.display());
+        assert!(!messages(&input).is_empty(), "{} is empty", input.display());
     }
 }

@@ -87,6 +87,7 @@ CONTENTS = {
         ],
         "Code": [
             ("Contributing", "/CONTRIBUTING"),
+            ("Published methods", "/pipelines/examples/published/README"),
         ],
     },
     "CONTRIBUTING": {

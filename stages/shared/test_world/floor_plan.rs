@@ -1,4 +1,4 @@
-//! Floor plans for tests, and robots' maps of them.
+//! Floor plans, and robots' maps of them.
 
 use crate::registration::comparison::MapView;
 use crate::registration::icp::FirstGuess;
@@ -11,51 +11,63 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 const HALF_WALL: f64 = 0.06;
 
 /// Straight walls in the frame of the world.
-pub(crate) struct FloorPlan {
+#[derive(Clone, Debug)]
+pub struct FloorPlan {
     walls: Vec<(Point2, Point2)>,
 }
 
 /// The part of the world that a robot sees: the rectangle between two corners, metres.
-#[derive(Clone, Copy)]
-pub(crate) struct Seen {
-    pub(crate) low: Point2,
-    pub(crate) high: Point2,
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// The corner with the least coordinates.
+    pub low: Point2,
+    /// The corner with the greatest coordinates.
+    pub high: Point2,
 }
 
 /// Pose of a map's frame, and how the map is drawn.
-#[derive(Clone, Copy)]
-pub(crate) struct Drawing {
-    pub(crate) transform_world_map: Pose2,
-    pub(crate) resolution: f64,
-    /// Yaw of the grid in the map's frame.
-    pub(crate) grid_yaw: f64,
+#[derive(Clone, Copy, Debug)]
+pub struct Drawing {
+    /// `T_world_map`.
+    pub transform_world_map: Pose2,
+    /// Metres per cell.
+    pub resolution: f64,
+    /// Yaw of the grid in the map's frame, radians.
+    pub grid_yaw: f64,
 }
 
 /// A drawn map.
-pub(crate) struct DrawnMap {
-    pub(crate) geometry: GridGeometry,
-    pub(crate) cells: Vec<i8>,
-    pub(crate) walls: WallMap,
-    pub(crate) transform_world_map: Pose2,
+#[derive(Debug)]
+pub struct DrawnMap {
+    /// Geometry of its cells.
+    pub geometry: GridGeometry,
+    /// Row by row: -1 unknown, 0 free, 100 occupied.
+    pub cells: Vec<i8>,
+    /// Its walls.
+    pub walls: WallMap,
+    /// `T_world_map`: the true pose of its frame.
+    pub transform_world_map: Pose2,
 }
 
-pub(crate) fn seen(x1: f64, y1: f64, x2: f64, y2: f64) -> Seen {
+/// The part of the world between the corners (x1, y1) and (x2, y2), metres.
+pub fn seen(x1: f64, y1: f64, x2: f64, y2: f64) -> Seen {
     Seen { low: Point2::new(x1, y1), high: Point2::new(x2, y2) }
 }
 
 impl FloorPlan {
-    pub(crate) fn new(walls: &[[f64; 4]]) -> Self {
+    /// A plan of walls from (x1, y1) to (x2, y2), metres.
+    pub fn new(walls: &[[f64; 4]]) -> Self {
         Self { walls: walls.iter().map(|[x1, y1, x2, y2]| (Point2::new(*x1, *y1), Point2::new(*x2, *y2))).collect() }
     }
 
     /// The same with more walls.
-    pub(crate) fn with(mut self, walls: &[[f64; 4]]) -> Self {
+    pub fn with(mut self, walls: &[[f64; 4]]) -> Self {
         self.walls.extend(Self::new(walls).walls);
         self
     }
 
     /// An office of 20 x 12 m: a corridor, rooms of all sizes with doors, and one slanted wall.
-    pub(crate) fn office() -> Self {
+    pub fn office() -> Self {
         Self::new(&[
             [0.0, 0.0, 20.0, 0.0],
             [20.0, 0.0, 20.0, 12.0],
@@ -80,7 +92,7 @@ impl FloorPlan {
     }
 
     /// Another office of the same size.
-    pub(crate) fn another_office() -> Self {
+    pub fn another_office() -> Self {
         Self::new(&[
             [0.0, 0.0, 20.0, 0.0],
             [20.0, 0.0, 20.0, 12.0],
@@ -97,12 +109,12 @@ impl FloorPlan {
     }
 
     /// A hall of 20 x 12 m that looks the same after half a turn.
-    pub(crate) fn hall() -> Self {
+    pub fn hall() -> Self {
         Self::new(&[[0.0, 0.0, 20.0, 0.0], [20.0, 0.0, 20.0, 12.0], [20.0, 12.0, 0.0, 12.0], [0.0, 12.0, 0.0, 0.0]])
     }
 
     /// A building of 20 m x 12 m that looks the same after half a turn.
-    pub(crate) fn symmetric() -> Self {
+    pub fn symmetric() -> Self {
         let mut walls = vec![];
         for [x1, y1, x2, y2] in [
             [0.0, 0.0, 20.0, 0.0],
@@ -118,23 +130,23 @@ impl FloorPlan {
     }
 
     /// A building of 20 x 12 m whose two halves are the same but for one short wall.
-    pub(crate) fn nearly_symmetric() -> Self {
+    pub fn nearly_symmetric() -> Self {
         Self::symmetric().with(&[[9.0, 8.0, 9.8, 8.0]])
     }
 
     /// A straight corridor without an end, 2 m wide.
-    pub(crate) fn corridor() -> Self {
+    pub fn corridor() -> Self {
         Self::new(&[[-100.0, -1.0, 100.0, -1.0], [-100.0, 1.0, 100.0, 1.0]])
     }
 
     /// The plan as a mirror along the x axis shows it, at the height of its middle.
-    pub(crate) fn mirrored(&self, middle: f64) -> Self {
+    pub fn mirrored(&self, middle: f64) -> Self {
         let mirror = |point: &Point2| Point2::new(point.x, 2.0 * middle - point.y);
         Self { walls: self.walls.iter().map(|(p, q)| (mirror(p), mirror(q))).collect() }
     }
 
     /// The map of a robot that has seen a part of the plan.
-    pub(crate) fn draw(&self, part: Seen, drawing: Drawing) -> DrawnMap {
+    pub fn draw(&self, part: Seen, drawing: Drawing) -> DrawnMap {
         let Drawing { transform_world_map, resolution, grid_yaw } = drawing;
         let turn = nalgebra::UnitComplex::new(grid_yaw);
         // The smallest grid of that yaw that contains what was seen.
@@ -172,7 +184,7 @@ impl FloorPlan {
 
 impl DrawnMap {
     /// Meta data of the grid's message.
-    pub(crate) fn info(&self) -> MapMetaData {
+    pub fn info(&self) -> MapMetaData {
         MapMetaData {
             resolution: self.geometry.resolution as f32,
             width: self.geometry.width as u32,
@@ -183,16 +195,17 @@ impl DrawnMap {
     }
 
     /// The cells as in a message.
-    pub(crate) fn bytes(&self) -> Vec<u8> {
+    pub fn bytes(&self) -> Vec<u8> {
         self.cells.iter().map(|cell| *cell as u8).collect()
     }
 
-    pub(crate) fn view(&self) -> MapView<'_> {
+    /// The map as it is compared with others.
+    pub fn view(&self) -> MapView<'_> {
         MapView::rigid(Grid::new(self.geometry, &self.cells).unwrap(), &self.walls)
     }
 
     /// This map deformed by drift: every point is displaced by [`deformation_at`].
-    pub(crate) fn deformed(&self, most: f64) -> Self {
+    pub fn deformed(&self, most: f64) -> Self {
         let grid = Grid::new(self.geometry, &self.cells).unwrap();
         let cells = (0..self.cells.len()).map(|index| {
             let cell = Cell { column: index % self.geometry.width, row: index / self.geometry.width };
@@ -205,23 +218,24 @@ impl DrawnMap {
     }
 
     /// True `T_self_other`.
-    pub(crate) fn transform_to(&self, other: &Self) -> Pose2 {
+    pub fn transform_to(&self, other: &Self) -> Pose2 {
         self.transform_world_map.inverse() * other.transform_world_map
     }
 }
 
 /// Displacement of a point of a deformed map: up to `most` metres along x and along y, in waves that are longer than
 /// a building.
-pub(crate) fn deformation_at(most: f64, place: &Point2) -> Vector2<f64> {
+pub fn deformation_at(most: f64, place: &Point2) -> Vector2<f64> {
     most * Vector2::new((place.y / 7.0).sin(), (place.x / 13.0).sin())
 }
 
-pub(crate) fn drawing(x: f64, y: f64, yaw: f64) -> Drawing {
+/// A map in cells of 0.05 m whose frame is at (x, y), metres, turned by `yaw` radians.
+pub fn drawing(x: f64, y: f64, yaw: f64) -> Drawing {
     Drawing { transform_world_map: crate::shared::geometry::pose(x, y, yaw), resolution: 0.05, grid_yaw: 0.0 }
 }
 
 /// A first guess that is off by a shift and a turn about the origin of map b, with a covariance as large.
-pub(crate) fn guess(transform_a_b: Pose2, x: f64, y: f64, yaw: f64) -> FirstGuess {
+pub fn guess(transform_a_b: Pose2, x: f64, y: f64, yaw: f64) -> FirstGuess {
     let covariance = Matrix3::from_diagonal(&Vector3::new(0.3 * 0.3, 0.3 * 0.3, 0.05 * 0.05));
     let mut transform_a_b = transform_a_b;
     transform_a_b.translation.vector += Vector2::new(x, y);
@@ -230,7 +244,7 @@ pub(crate) fn guess(transform_a_b: Pose2, x: f64, y: f64, yaw: f64) -> FirstGues
 }
 
 /// Distance of two transforms: metres in the plan's middle, and radians.
-pub(crate) fn apart(one: &Pose2, other: &Pose2, map_b: &DrawnMap) -> (f64, f64) {
+pub fn apart(one: &Pose2, other: &Pose2, map_b: &DrawnMap) -> (f64, f64) {
     let middle = map_b.transform_world_map.inverse() * Point2::new(10.0, 6.0);
     ((one * middle - other * middle).norm(), one.rotation.angle_to(&other.rotation).abs())
 }

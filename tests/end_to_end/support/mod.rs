@@ -98,6 +98,22 @@ pub(crate) fn gridweave_program() -> &'static Path {
     Path::new(env!("CARGO_BIN_EXE_troubled_stages"))
 }
 
+/// The command with the published methods.
+pub(crate) fn published_program() -> &'static Path {
+    Path::new(env!("CARGO_BIN_EXE_published"))
+}
+
+/// Runs the command with the published methods in `folder`.
+#[track_caller]
+pub(crate) fn published(folder: &Path, args: &[&str]) -> Ended {
+    start_program(published_program(), folder, args, &[]).wait()
+}
+
+/// The file of a pipeline of the published methods.
+pub(crate) fn published_pipeline(name: &str) -> String {
+    format!("{}/../pipelines/examples/published/{name}.toml", env!("CARGO_MANIFEST_DIR"))
+}
+
 /// Starts `gridweave` in `folder`.
 #[track_caller]
 pub(crate) fn start(folder: &Path, args: &[&str], variables: &[(&str, &str)]) -> Running {

@@ -31,7 +31,7 @@ use std::path::Path;
 /// A case with an input.
 #[derive(Clone, Copy)]
 pub(crate) struct Case {
-    /// The stage kind, a folder of `tests/golden`.
+    /// The stage kind, a folder of golden cases.
     pub(crate) kind: &'static str,
     /// The case, a folder in it.
     pub(crate) name: &'static str,

@@ -35,7 +35,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Example:
-  gridweave compare --pipelines map_merge hough_spectrum --inputs logs/ one.mcap --csv table.csv
+  gridweave compare --pipelines map_merge topological --inputs logs/ one.mcap --csv table.csv
 
 A robot is right if its pose is less than 0.5 m, at the middle of its map, and 1 degree from the truth, as in `evaluate`; for a \
 pair of map files, the distances between common places decide. Success counts robots that are right or rightly refused; refused \

@@ -1,0 +1,206 @@
+//! The method on drawn maps, and the stage as a whole.
+
+use super::*;
+use gridweave_stages::shared::geometry::{Grid, GridGeometry, pose, turn_difference};
+use gridweave_stages::shared::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, seen};
+use gridweave_stages::shared::test_world::stage_bench::StageBench;
+use nalgebra::UnitComplex;
+use proptest::prelude::*;
+use std::f64::consts::PI;
+
+fn walls(points: &[[f64; 2]]) -> WallCells {
+    let radius = points.iter().map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max);
+    let points = points.iter().map(|[x, y]| [*x as f32, *y as f32]).collect();
+    WallCells { middle: nalgebra::Point2::origin(), radius, points }
+}
+
+/// Points along the sides of an angle, the arms of which are of unequal length.
+fn corner(yaw: f64) -> Vec<[f64; 2]> {
+    let arms =
+        (0..200).map(|index| (0.05 * f64::from(index), 0.0)).chain((0..90).map(|index| (0.0, 0.05 * f64::from(index))));
+    let turn = UnitComplex::new(yaw);
+    arms.map(|(x, y)| (turn * nalgebra::Vector2::new(x, y)).into()).collect()
+}
+
+fn named<'a>(robot: &'a str, map: &'a DrawnMap) -> NamedMap<'a> {
+    NamedMap { robot, grid: Grid::new(map.geometry, &map.cells).unwrap() }
+}
+
+fn align(a: &DrawnMap, b: &DrawnMap) -> Vec<Hypothesis> {
+    let parameters = HoughSpectrumParameters::default();
+    let mut found = align_spectra(&named("a", a), &named("b", b), &parameters).unwrap();
+    parameters.criterion().rank(&mut found);
+    found
+}
+
+#[test]
+fn a_line_has_all_its_energy_in_its_normal() {
+    let line: Vec<[f64; 2]> = (-50..=50).map(|index| [0.05 * f64::from(index), 0.0]).collect();
+    let spectrum = HoughSpectrum::new(&walls(&line), 180, 0.05);
+    assert_eq!(spectrum.main_direction(), PI / 2.0);
+    assert_eq!(spectrum.values[90], 101.0 * 101.0);
+    assert_eq!(spectrum.values[0], 101.0, "seen from its end every point is on a line of its own");
+}
+
+#[test]
+fn the_spectrum_of_one_cell_is_flat_and_one_direction_is_enough() {
+    let spectrum = HoughSpectrum::new(&walls(&[[0.0, 0.0]]), 7, 0.05);
+    assert_eq!((&spectrum.values, spectrum.main_direction()), (&vec![1.0; 7], 0.0));
+    assert_eq!(HoughSpectrum { values: Vec::new() }.main_direction(), 0.0);
+    let one = HoughSpectrum { values: vec![3.0] };
+    assert!(correlate_spectra(&one, &one) == [9.0] && rotations(&one, &one, 4, 0.1).is_empty(), "nothing stands out");
+}
+
+proptest! {
+    #[test]
+    fn a_turn_of_the_map_shifts_the_spectrum_and_is_found(yaw in -4.0..4.0, frame in -4.0..4.0) {
+        let a = HoughSpectrum::new(&walls(&corner(frame)), 720, 0.05);
+        let b = HoughSpectrum::new(&walls(&corner(frame - yaw)), 720, 0.05);
+        let found = rotations(&a, &b, 1, 0.1)[0];
+        prop_assert!(turn_difference(found.angle, yaw, PI).abs() < 0.0088, "{found:?}");
+        prop_assert!((0.0..PI).contains(&found.angle) && found.deviation > 0.0 && found.deviation < 0.1);
+    }
+
+    #[test]
+    fn the_correlation_of_spectra_is_the_sum_that_the_paper_writes(
+        a in prop::collection::vec(0u32..1000, 9), b in prop::collection::vec(0u32..1000, 9),
+    ) {
+        let spectrum = |values: &[u32]| HoughSpectrum { values: values.iter().map(|value| f64::from(*value)).collect() };
+        let expected: Vec<f64> = (0..9)
+            .map(|k| (0..9).map(|i| f64::from(a[i]) * f64::from(b[(i + 9 - k) % 9])).sum())
+            .collect();
+        prop_assert_eq!(correlate_spectra(&spectrum(&a), &spectrum(&b)), expected);
+    }
+
+    #[test]
+    fn a_shift_along_an_axis_is_found(
+        cells in prop::collection::btree_set(0i32..400, 20..60), shift in -300i32..300, cell in 0.02..0.3,
+    ) {
+        let of = |shift: i32| {
+            let points: Vec<[f64; 2]> =
+                cells.iter().map(|place| [(f64::from(place + shift) - 200.0) * cell, 0.3 * cell]).collect();
+            project(&walls(&points), 0.0, cell)
+        };
+        let ([x_a, y_a], [x_b, y_b]) = (of(0), of(shift));
+        let found = [shifts(&x_a, &x_b, cell, 1, 0.1)[0], shifts(&y_a, &y_b, cell, 1, 0.1)[0]];
+        prop_assert!((found[0].metres + f64::from(shift) * cell).abs() <= 1.01 * cell, "{found:?} {shift}");
+        prop_assert!(found[1].metres.abs() <= 1.01 * cell && found[0].deviation > 0.0);
+    }
+}
+
+#[test]
+fn maps_of_one_building_are_aligned_at_any_angle() {
+    let office = FloorPlan::office();
+    let a = office.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(3.0, 2.0, 0.4));
+    for yaw in [0.0, 0.61, 1.571, 2.345, -2.9] {
+        let b = office.draw(seen(-0.2, -0.2, 20.2, 12.2), Drawing { grid_yaw: 1.1, ..drawing(12.0, 6.0, yaw) });
+        let found = align(&a, &b);
+        let (metres, radians) = apart(&found[0].transform_a_b, &a.transform_to(&b), &b);
+        assert!(metres < 0.05 && radians < 0.004, "{metres} m, {radians} rad at {yaw}");
+        assert!(found[0].index.omega() > 0.95 && found[0].overlap > 0.9, "{:?}", found[0]);
+        assert!(found[1].index.omega() < found[0].index.omega(), "{found:?}");
+    }
+}
+
+#[test]
+fn the_covariance_is_that_of_the_place_in_the_middle_of_the_map() {
+    let office = FloorPlan::office();
+    let a = office.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(3.0, 2.0, 0.4));
+    let near = office.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(10.0, 6.0, 1.0));
+    let far = office.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(400.0, -700.0, 1.0));
+    for b in [&near, &far] {
+        let found = align(&a, b)[0];
+        let middle = b.transform_world_map.inverse() * nalgebra::Point2::new(10.0, 6.0);
+        let jacobian = gridweave_stages::shared::geometry::point_jacobian(&found.transform_a_b, &middle);
+        let deviations = (jacobian * found.covariance * jacobian.transpose()).diagonal().map(f64::sqrt);
+        assert!(deviations.min() > 0.01 && deviations.max() < 0.2, "{deviations}");
+        assert!(found.covariance.m33.sqrt() < 0.02 && found.covariance.cholesky().is_some());
+    }
+}
+
+#[test]
+fn a_hall_fits_both_ways_round() {
+    let hall = FloorPlan::hall();
+    let a = hall.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(3.0, 2.0, 0.4));
+    let b = hall.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
+    let found = align(&a, &b);
+    assert!((found[0].index.omega() - found[1].index.omega()).abs() < 0.02, "{found:?}");
+    let turn = found[0].transform_a_b.rotation.angle_to(&found[1].transform_a_b.rotation);
+    assert!((turn.abs() - PI).abs() < 1e-9);
+}
+
+#[test]
+fn maps_without_walls_and_too_large_ones_are_refused_and_a_single_cell_fits_anywhere() {
+    let office = FloorPlan::office().draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(3.0, 2.0, 0.4));
+    let geometry = GridGeometry { width: 10, height: 10, resolution: 0.05, origin: pose(1e6, -1e6, 0.3) };
+    let (empty, mut cells) = ([0; 100], [0; 100]);
+    cells[37] = 100;
+    let [empty, one_cell] =
+        [&empty, &cells].map(|cells| NamedMap { robot: "b", grid: Grid::new(geometry, cells).unwrap() });
+    let office = named("a", &office);
+    let parameters = HoughSpectrumParameters::default();
+    let refusal = align_spectra(&office, &empty, &parameters).unwrap_err();
+    assert_eq!(refusal.to_string(), "the map of b has no walls");
+    for (a, b) in [(&office, &one_cell), (&one_cell, &office), (&one_cell, &one_cell)] {
+        let found = align_spectra(a, b, &parameters).unwrap();
+        assert!(found.iter().all(|one| one.covariance.iter().all(|value| value.is_finite())), "{found:?}");
+    }
+    let small = HoughSpectrumParameters { max_extent: 15.0, ..parameters };
+    let refusal = align_spectra(&office, &one_cell, &small).unwrap_err();
+    assert!(refusal.to_string().contains("longer than 15 m"), "{refusal}");
+}
+
+#[test]
+fn the_stage_aligns_every_pair_at_the_end_and_ranks_what_it_has_found() {
+    let office = FloorPlan::office();
+    let draw = |yaw| office.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(12.0, 6.0, yaw));
+    let (a, b, c) = (draw(0.0), draw(0.4), draw(2.0));
+    let mut bench = StageBench::new(&kind(), "max_hypotheses = 2\nmin_omega = 0.9");
+    for (robot, map) in [("robot2", &b), ("robot3", &c), ("robot1", &c), ("robot1", &a)] {
+        assert_eq!(bench.give_map(robot, map), []);
+    }
+    let sent = bench.finish();
+    let pairs: Vec<(&str, &str)> = sent.iter().map(|one| (one.a.as_str(), one.b.as_str())).collect();
+    assert_eq!(pairs, [("robot1", "robot2"), ("robot1", "robot3"), ("robot2", "robot3")]);
+    for (one, (a, b)) in sent.iter().zip([(&a, &b), (&a, &c), (&b, &c)]) {
+        assert!(one.accepted && !one.provisional && one.score > 0.9, "{one:?}");
+        assert_eq!((one.method.as_str(), one.rank, one.hypotheses), ("hough_spectrum", 0, 0));
+        let (metres, radians) = apart(&one.transform_a_b(), &a.transform_to(b), b);
+        assert!(metres < 0.05 && radians < 0.004, "{metres} m, {radians} rad");
+    }
+    let guesses: Vec<gridweave_runtime::ros::Alignment> = bench.stage.take("hypotheses").unwrap();
+    let ranks: Vec<(u32, u32, bool)> = guesses.iter().map(|one| (one.rank, one.hypotheses, one.provisional)).collect();
+    assert_eq!(ranks, [(0, 2, true), (1, 2, true)].repeat(3));
+}
+
+#[test]
+fn a_refusal_has_a_reason() {
+    let office = FloorPlan::office().draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(3.0, 2.0, 0.4));
+    let other = FloorPlan::another_office().draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(1.0, 6.0, 1.4));
+    let part = FloorPlan::office().draw(seen(-0.2, -0.2, 4.0, 4.0), drawing(1.0, 6.0, 1.4));
+    for (parameters, b, text) in [
+        ("min_omega = 1.0", &other, "contradict each other"),
+        ("min_omega = 0.0\nmin_overlap = 1.0", &other, "overlap too little"),
+        ("max_extent = 15.0", &part, "the map of robot1 is longer"),
+    ] {
+        let mut bench = StageBench::new(&kind(), parameters);
+        bench.give_map("robot1", &office);
+        bench.give_map("robot2", b);
+        let sent = bench.finish();
+        assert!(!sent[0].accepted && sent[0].reason.contains(text), "{}", sent[0].reason);
+    }
+}
+
+#[test]
+fn parameters_out_of_range_are_refused() {
+    for text in [
+        "rotation_step = 0.0",
+        "min_omega = 1.1",
+        "rotations = 0",
+        "translations = 1000",
+        "cell = 0.01\nmax_extent = 400.0",
+        "cell = nan",
+    ] {
+        assert!(gridweave_runtime::stage::StageHarness::new(&kind(), text).is_err(), "{text}");
+    }
+}
