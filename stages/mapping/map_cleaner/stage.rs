@@ -35,10 +35,18 @@ impl MapCleaner {
             }
         };
         let prefix = GridPrefix { header: map.header.clone(), info: map.info };
+        let mut has_frame = false;
         output.map.send_grid(map.robot(), &prefix, |blank| {
             let mut filled = blank.copy_cells(grid.cells)?;
-            clean(&grid, &self.parameters, filled.cells_mut());
+            has_frame = clean(&grid, &self.parameters, filled.cells_mut());
             Ok(filled)
-        })
+        })?;
+        if has_frame {
+            output.warn(format!(
+                "the map of {} is a drawing in a frame: the frame, and what is connected with it, is not compared with other maps",
+                map.robot()
+            ));
+        }
+        Ok(())
     }
 }

@@ -47,6 +47,33 @@ fn a_wall_that_lacks_cells_stays_whole() {
 }
 
 #[test]
+fn the_frame_of_a_sheet_and_its_title_block_become_unknown() {
+    let is_frame = |column: usize, row: usize| {
+        let is_block = row == 30 && column >= 40 || column == 40 && row >= 30;
+        !(1..WIDTH - 1).contains(&column) || !(1..HEIGHT - 1).contains(&row) || is_block
+    };
+    let value = |column: usize, row: usize| if is_frame(column, row) { 100 } else { room(column, row) };
+    let (before, after) = cleaned(value);
+    for (index, (before, after)) in before.iter().zip(&after).enumerate() {
+        let is_frame = is_frame(index % WIDTH, index / WIDTH);
+        assert_eq!(*after, if is_frame { UNKNOWN } else { *before }, "{index}");
+    }
+    // A hall all of whose walls are connected, and the map of a robot that sees nothing behind its walls.
+    let (before, after) =
+        cleaned(
+            |column, row| {
+                if column == 20 && row > 10 { 100 } else { value(column, row).min(if row == 20 { 0 } else { 100 }) }
+            },
+        );
+    assert_eq!(before, after);
+    let (before, after) =
+        cleaned(
+            |column, row| if column < 30 && row > 21 && !is_frame(column, row) { UNKNOWN } else { value(column, row) },
+        );
+    assert_eq!(before, after);
+}
+
+#[test]
 fn a_ray_through_a_window_is_removed_and_a_door_is_not() {
     // Below row 20 a room; above it a ray of two cells and a corridor of a metre, seen through gaps of the wall.
     let is_ray = |column: usize, row: usize| row > 20 && (14..16).contains(&column);
