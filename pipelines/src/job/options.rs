@@ -47,7 +47,7 @@ pub(crate) struct RunOptions {
     pub(crate) resolution: Vec<String>,
     /// The pose of a robot's lidar on its base, metres and radians, instead of that in the log's tf. A fourth number is the
     /// roll: 3.1416 for a lidar that is mounted upside down.
-    #[arg(long, value_name = "ROBOT=X,Y,YAW", allow_hyphen_values = true)]
+    #[arg(long, value_name = "ROBOT=X,Y,YAW[,ROLL]", allow_hyphen_values = true)]
     pub(crate) lidar: Vec<String>,
     #[command(flatten)]
     pub(crate) reading: ReadingOptions,

@@ -14,7 +14,8 @@ pub enum SearchRefusal {
     /// A map with walls, all other cells of which are unknown.
     #[error(
         "the map of {robot} has walls and no free space\ntry: let its SLAM mark what its beams have passed as free (RTAB-Map: \
-         Grid/RayTracing), or give a map file whose ground is free\n\nwalls are compared from the side of the free space"
+         Grid/RayTracing), or give a map file whose ground is free, not a grey \
+         between `free_thresh` and `occupied_thresh`\n\nwalls are compared from the side of the free space"
     )]
     NoFreeSpace {
         /// Name of the robot.
