@@ -265,11 +265,7 @@ impl McapSink {
                 Some(Target::Lane(lane)) => *lane,
                 Some(Target::Transforms(lane)) => {
                     if let Some((bytes, left_out)) = self.given_frames.without(message.bytes()) {
-                        for _ in 0..left_out {
-                            output.warn(
-                                "input transforms that place a robot's map frame were dropped: this run places it",
-                            );
-                        }
+                        left_out.into_iter().for_each(|reason| output.warn(reason));
                         if bytes.is_empty() {
                             return Ok(());
                         }
