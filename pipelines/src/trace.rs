@@ -26,6 +26,7 @@ pub(crate) fn file() -> Option<&'static PathBuf> {
 
 /// A trace that is being written.
 pub(crate) struct Trace {
+    path: PathBuf,
     output: OutputFile,
     progress: Arc<Progress>,
     writing: Option<FlushGuard>,
@@ -65,22 +66,22 @@ impl Trace {
         }
         let output = OutputFile::create(path).context("cannot write the trace")?;
         let file = output.file().try_clone().with_context(|| format!("cannot write the trace {}", path.display()))?;
-        // A program has one command line.
-        let _ = FILE.set(path.to_owned());
         let progress = Arc::new(Progress::default());
         let writer = TraceWriter { path: path.to_owned(), file, progress: Arc::clone(&progress) };
-        Ok((Self { output, progress, writing: None }, writer))
+        Ok((Self { path: path.to_owned(), output, progress, writing: None }, writer))
     }
 
-    /// The same trace, whose writing ends when the guard is dropped.
+    /// The same trace as that of this program. Its writing ends when the guard is dropped.
     pub(crate) fn written_by(self, guard: FlushGuard) -> Self {
+        // A program has one command line.
+        let _ = FILE.set(self.path.clone());
         Self { writing: Some(guard), ..self }
     }
 
     /// Ends the trace. It replaces an earlier file only if the command `is_done`; that of a command that failed stays as a part
     /// where there is such a file, and is removed if there is nothing in it.
     pub(crate) fn end(self, is_done: bool) {
-        let Self { output, progress, writing } = self;
+        let Self { output, progress, writing, .. } = self;
         drop(writing);
         if progress.has_failed.load(Ordering::Relaxed) {
             return;
