@@ -107,10 +107,10 @@ fn is_named(trace: &Path, words: &[OsString]) -> bool {
         let text = word.to_string_lossy();
         if text == "--trace" {
             words.next();
-        } else if !text.starts_with("--trace=") {
-            if is_it(word) || text.split_once('=').is_some_and(|(_, value)| is_it(value.as_ref())) {
-                return true;
-            }
+        } else if !text.starts_with("--trace=")
+            && (is_it(word) || text.split_once('=').is_some_and(|(_, value)| is_it(value.as_ref())))
+        {
+            return true;
         }
     }
     false
