@@ -4,10 +4,15 @@
 //! the writer dies. So a locked part belongs to a running writer, and no other program touches it; an unlocked part was
 //! left by a killed writer.
 
+mod left;
+
+pub use left::{leave, place, remove_left};
+pub(crate) use left::{replace_or_leave, unlock_left};
+
 use crate::os_error;
 use rustix::fs::{Access, OFlags, access};
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, ErrorKind};
 use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
@@ -74,20 +79,14 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
 /// # Errors
 /// A file cannot be written or renamed.
 pub fn replace(files: &[(&Path, &[u8])]) -> Result<(), WriteError> {
-    let write = |(path, bytes): &(&Path, &[u8])| {
-        let output = OutputFile::create(path)?;
-        (&output.file).write_all(bytes).map_err(|error| output.error(error))?;
-        Ok(output)
-    };
-    let outputs = files.iter().map(write).collect::<Result<Vec<_>, _>>()?;
-    outputs.into_iter().try_for_each(|output| output.put_in_place().map(drop))
+    replace_or_leave(files, false)
 }
 
 /// An output file that is written as a part. While this exists, no other program writes the file.
 ///
 /// On drop the part is deleted, unless it was renamed or is to be kept.
 #[derive(Debug)]
-pub(crate) struct OutputFile {
+pub struct OutputFile {
     /// The path as given by the user.
     path: PathBuf,
     /// The canonical path.
@@ -100,7 +99,10 @@ pub(crate) struct OutputFile {
 
 impl OutputFile {
     /// Creates the part. One left by a killed writer is removed.
-    pub(crate) fn create(path: &Path) -> Result<Self, WriteError> {
+    ///
+    /// # Errors
+    /// It cannot be written, or another program writes it.
+    pub fn create(path: &Path) -> Result<Self, WriteError> {
         let of_path = |error| WriteError::Io { path: path.to_owned(), error };
         let (place, part) = places(path)?;
         loop {
@@ -138,12 +140,12 @@ impl OutputFile {
     }
 
     /// The open part.
-    pub(crate) fn file(&self) -> &File {
+    pub fn file(&self) -> &File {
         &self.file
     }
 
     /// The path of the part.
-    pub(crate) fn part(&self) -> &Path {
+    pub fn part(&self) -> &Path {
         &self.part
     }
 
@@ -158,7 +160,10 @@ impl OutputFile {
     }
 
     /// Renames the part to the file, replacing an existing file. Returns the file, still locked.
-    pub(crate) fn put_in_place(mut self) -> Result<File, WriteError> {
+    ///
+    /// # Errors
+    /// Another program has removed or replaced the part, or it cannot be renamed.
+    pub fn put_in_place(mut self) -> Result<File, WriteError> {
         let put = || {
             if !is_at(&self.file, &self.part) {
                 let text = format!(
@@ -180,7 +185,10 @@ impl OutputFile {
     }
 
     /// Renames the part to the file if there is no such file, and keeps the part otherwise. Returns its path.
-    pub(crate) fn put_in_free_place(mut self) -> Result<PathBuf, WriteError> {
+    ///
+    /// # Errors
+    /// It cannot be renamed.
+    pub fn put_in_free_place(mut self) -> Result<PathBuf, WriteError> {
         self.is_kept = true;
         if fs::symlink_metadata(&self.place).is_ok() {
             return Ok(self.part.clone());
@@ -293,6 +301,7 @@ fn process_with_lock(file: &File) -> Option<u32> {
 mod tests {
     use super::*;
     use rustix::fs::{CWD, FileType, Mode, mknodat};
+    use std::io::Write;
     use std::os::unix::fs::symlink;
 
     #[test]

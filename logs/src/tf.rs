@@ -1,7 +1,8 @@
 //! Robot poses from tf, the tree of frames that ROS programs publish edge by edge.
 
+use crate::robots::fits;
 use crate::schemas::full_type_name;
-use gridweave_runtime::message::{Channel, LONGEST_ROBOT_NAME};
+use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{Header, Point, Pose, PoseStamped, Quaternion, RosMessage, TFMessage, Time, Transform};
 use gridweave_runtime::stage::{TfFrames, frame_of_robot, match_robot};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
@@ -198,7 +199,7 @@ impl TfPoses {
         let Some(frames) = &self.frames else { return };
         for pattern in [&frames.map_frame, &frames.base_frame] {
             if let Some(robot) = match_robot(pattern, frame)
-                && robot.len() <= LONGEST_ROBOT_NAME
+                && fits(robot)
                 && !self.robots.contains_key(robot)
             {
                 let named = |pattern: &str| pattern.replace("{robot}", robot);

@@ -1,6 +1,6 @@
 //! The ground truth of a simulated log, as a JSON file for the evaluation of merges.
 
-use crate::file::replace;
+use crate::file::replace_or_leave;
 use gridweave_runtime::ros::SimulationTruth;
 use gridweave_runtime::stage::{Context, Output, Parameters, Received, StageError, StageKind};
 use schemars::JsonSchema;
@@ -14,6 +14,9 @@ use std::path::PathBuf;
 struct TruthParameters {
     /// The JSON file to write. An existing file is replaced.
     file: PathBuf,
+    /// Whether the file is left as `FILE.part` when it is whole: the command renames the files of all stages together. Set by the
+    /// command.
+    leave_part: bool,
 }
 
 impl Parameters for TruthParameters {}
@@ -27,22 +30,23 @@ pub fn kind() -> StageKind {
 
 struct TruthSink {
     file: PathBuf,
+    leave_part: bool,
 }
 
 impl TruthSink {
-    fn new(TruthParameters { file }: TruthParameters, _: &Context) -> Result<Self, StageError> {
+    fn new(TruthParameters { file, leave_part }: TruthParameters, _: &Context) -> Result<Self, StageError> {
         if file.as_os_str().is_empty() {
             let doing = "write the truth";
             return Err(StageError::new(doing, "it has no file").with_help("give --truth FILE or file = \"FILE\""));
         }
-        Ok(Self { file })
+        Ok(Self { file, leave_part })
     }
 
     fn write(&mut self, truth: Received<'_, SimulationTruth>, _: &Output<()>) -> Result<(), StageError> {
         let failed =
             |cause: &dyn std::fmt::Display| StageError::new(format!("write the truth {}", self.file.display()), cause);
         let text = serde_json::to_string_pretty(&to_json(&truth)).map_err(|error| failed(&error))? + "\n";
-        replace(&[(&self.file, text.as_bytes())]).map_err(|error| failed(&error))
+        replace_or_leave(&[(&self.file, text.as_bytes())], self.leave_part).map_err(|error| failed(&error))
     }
 }
 

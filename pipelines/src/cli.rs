@@ -10,6 +10,7 @@ use crate::status::Status;
 use anyhow::Result;
 use clap::{CommandFactory, Parser, Subcommand};
 use gridweave_runtime::stage::Registry;
+use std::ffi::OsString;
 
 /// Merges the maps of several robots that explore one building, each in its own map frame.
 ///
@@ -107,9 +108,17 @@ impl Command {
 }
 
 impl Cli {
-    /// Runs the command with the given stage kinds. `on_warning` is called for each warning.
-    pub(crate) fn execute(self, registry: &Registry, on_warning: fn(&str, &str)) -> Result<Status> {
-        let _trace = self.logging.start(on_warning)?;
+    /// Runs the command, whose command line has these words, with the given stage kinds. `on_warning` is called for each warning.
+    pub(crate) fn execute(self, words: &[OsString], registry: &Registry, on_warning: fn(&str, &str)) -> Result<Status> {
+        let trace = self.logging.start(words, on_warning)?;
+        let done = self.run(registry);
+        if let Some(trace) = trace {
+            trace.end(done.is_ok());
+        }
+        done
+    }
+
+    fn run(self, registry: &Registry) -> Result<Status> {
         if self.command.must_end_in_order() {
             interrupt::hold_back();
         }

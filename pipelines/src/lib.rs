@@ -29,6 +29,7 @@ pub mod table;
 mod temporary;
 mod terminal;
 mod text_wrapping;
+mod trace;
 mod verb;
 
 pub use verb::Verb;
@@ -79,7 +80,7 @@ pub fn command_line(
         return 2;
     }
     let command = verbs.iter().fold(cli::Cli::command(), |command, verb| command.subcommand(verb.command()));
-    match execute(&command.get_matches_from(arguments), &registry, verbs, on_warning) {
+    match execute(&command.get_matches_from(&arguments), &arguments, &registry, verbs, on_warning) {
         Ok(Status::Done) => 0,
         Ok(Status::BadUse) => 2,
         Ok(Status::Failed) => 1,
@@ -101,6 +102,7 @@ pub fn is_bad_use(error: &anyhow::Error) -> bool {
 
 fn execute(
     matches: &clap::ArgMatches,
+    words: &[OsString],
     registry: &Registry,
     verbs: &[Verb],
     on_warning: fn(&str, &str),
@@ -111,5 +113,5 @@ fn execute(
         terminal::print(verb.execute(of_verb)?)?;
         return Ok(Status::Done);
     }
-    cli::Cli::from_arg_matches(matches)?.execute(registry, on_warning)
+    cli::Cli::from_arg_matches(matches)?.execute(words, registry, on_warning)
 }

@@ -1,13 +1,13 @@
 //! Logging of a command: events of the libraries as lines on standard error, and a trace of the work of every stage for a viewer.
 
-use crate::status::BadUse;
 use crate::terminal::eprint_line;
+use crate::trace::{Trace, TraceWriter};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use gridweave_runtime::engine::processes::Launch;
-use std::fs::File;
-use std::io::{self, BufWriter, IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::ffi::OsString;
+use std::io::{BufWriter, IsTerminal};
+use std::path::PathBuf;
 use std::sync::{Once, OnceLock};
 use tracing::field::{Field, Visit};
 use tracing::span;
@@ -58,19 +58,19 @@ enum LogFormat {
 }
 
 impl LoggingArgs {
-    /// Starts logging. The trace is complete when the guard is dropped. `on_warning` is called for each warning with its
-    /// module and text.
-    pub(crate) fn start(&self, on_warning: fn(&str, &str)) -> Result<Option<FlushGuard>> {
-        let (trace, guard) = self.trace_layer()?.unzip();
+    /// Starts logging for a command line of these words. `on_warning` is called for each warning with its module and text.
+    pub(crate) fn start(&self, words: &[OsString], on_warning: fn(&str, &str)) -> Result<Option<Trace>> {
+        let (trace, writer) = self.trace.as_deref().map(|path| Trace::create(path, words)).transpose()?.unzip();
+        let (layer, guard) = writer.map(trace_layer).unzip();
         // Set once, as the subscriber is.
         let _ = FORMAT.set(self.log_format);
         tracing_subscriber::registry()
             .with(self.lines())
             .with(StageNames)
-            .with(trace)
+            .with(layer)
             .with(warnings(on_warning))
             .init();
-        Ok(guard)
+        Ok(trace.zip(guard).map(|(trace, guard): (Trace, FlushGuard)| trace.written_by(guard)))
     }
 
     /// Layer that writes events as lines: warnings, or whatever `RUST_LOG` or the user asks for.
@@ -88,30 +88,28 @@ impl LoggingArgs {
             LogFormat::Json => lines.json().with_span_list(false).with_filter(filter).boxed(),
         }
     }
+}
 
-    /// Layer that writes spans as a trace in the format of Chrome, if one is asked for.
-    fn trace_layer<S>(&self) -> Result<Option<(impl Layer<S>, FlushGuard)>>
-    where
-        S: Subscriber + for<'a> LookupSpan<'a> + Send + Sync,
-    {
-        let Some(path) = &self.trace else { return Ok(None) };
-        let file = TraceFile::create(path)?;
-        let name_of = |recorded: &EventOrSpan<'_, '_, S>| match recorded {
-            EventOrSpan::Span(span) => {
-                let stage = span.extensions().get::<StageName>().map(|StageName(name)| name.clone());
-                stage.unwrap_or_else(|| span.name().to_owned())
-            }
-            EventOrSpan::Event(event) => event.metadata().name().to_owned(),
-        };
-        let (layer, guard) = ChromeLayerBuilder::new()
-            .writer(BufWriter::new(file))
-            .include_args(true)
-            .include_locations(false)
-            .name_fn(Box::new(name_of))
-            .build();
-        let is_work = filter_fn(|what| what.is_span() && *what.level() <= Level::DEBUG);
-        Ok(Some((layer.with_filter(is_work), guard)))
-    }
+/// Layer that writes spans as a trace in the format of Chrome. The trace is whole when the guard is dropped.
+fn trace_layer<S>(writer: TraceWriter) -> (impl Layer<S>, FlushGuard)
+where
+    S: Subscriber + for<'a> LookupSpan<'a> + Send + Sync,
+{
+    let name_of = |recorded: &EventOrSpan<'_, '_, S>| match recorded {
+        EventOrSpan::Span(span) => {
+            let stage = span.extensions().get::<StageName>().map(|StageName(name)| name.clone());
+            stage.unwrap_or_else(|| span.name().to_owned())
+        }
+        EventOrSpan::Event(event) => event.metadata().name().to_owned(),
+    };
+    let (layer, guard) = ChromeLayerBuilder::new()
+        .writer(BufWriter::new(writer))
+        .include_args(true)
+        .include_locations(false)
+        .name_fn(Box::new(name_of))
+        .build();
+    let is_work = filter_fn(|what| what.is_span() && *what.level() <= Level::DEBUG);
+    (layer.with_filter(is_work), guard)
 }
 
 /// The filter of events where `RUST_LOG` is not set, by the number of `-v`.
@@ -163,46 +161,6 @@ impl Visit for MessageText {
     }
 }
 
-/// The file of a trace. The first error of a write is reported; after it the trace is dropped and the run goes on.
-struct TraceFile {
-    path: PathBuf,
-    file: File,
-    has_failed: bool,
-}
-
-impl TraceFile {
-    /// Creates the file, which may replace an earlier trace but no other kind of file: a log could be named in error.
-    fn create(path: &Path) -> Result<Self> {
-        if path.extension().is_none_or(|ending| ending != "json") {
-            let text = format!("cannot write the trace {}: its name must end in .json", path.display());
-            return Err(BadUse(text).into());
-        }
-        let file = File::create(path).with_context(|| format!("cannot write the trace {}", path.display()))?;
-        Ok(Self { path: path.to_owned(), file, has_failed: false })
-    }
-
-    fn note(&mut self, written: io::Result<()>) {
-        if let Err(error) = written {
-            self.has_failed = true;
-            eprint_line(format_args!("the trace {} is not complete: {error}", self.path.display()));
-        }
-    }
-}
-
-impl Write for TraceFile {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if !self.has_failed {
-            let written = self.file.write_all(bytes);
-            self.note(written);
-        }
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
 /// Layer that keeps with each span the name of its stage.
 struct StageNames;
 
@@ -240,6 +198,7 @@ impl Visit for StageField {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::{self, Write};
     use std::sync::{Arc, Mutex};
 
     struct Lines(Arc<Mutex<Vec<u8>>>);

@@ -171,7 +171,7 @@ impl RunSummary {
     }
 
     /// Iterates over all warnings: stage, text, count.
-    fn warnings(&self) -> impl Iterator<Item = (&str, &str, u64)> {
+    pub(crate) fn warnings(&self) -> impl Iterator<Item = (&str, &str, u64)> {
         self.stages
             .iter()
             .flat_map(|stage| stage.warnings.iter().map(|(what, count)| (stage.name.as_str(), what.as_str(), *count)))

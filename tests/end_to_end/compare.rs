@@ -192,3 +192,17 @@ fn inputs_that_cannot_be_compared_are_errors_before_anything_runs() {
     let output = compared(folder.path(), &["--pipelines", "tag_only", "--inputs", "lone.mcap", "--unrelated"]);
     assert_eq!(output["runs"][0]["robots"][0]["outcome"], "wrong", "{output}");
 }
+
+#[test]
+fn a_table_that_would_replace_an_input_or_a_pipeline_is_refused() {
+    let folder = worlds();
+    fs::write(folder.path().join("p.toml"), gridweave(folder.path(), &["pipelines", "tag_only"]).stdout).unwrap();
+    for output in ["logs/one.mcap", "logs/one.truth.json", "logs/../logs/two.truth.json", "p.toml"] {
+        let before = fs::read(folder.path().join(output)).unwrap();
+        let ended = compare(folder.path(), &["--pipelines", "p.toml", "--inputs", "logs", "--csv", output]);
+        ended.assert(2, &["is an input"]);
+        assert!(fs::read(folder.path().join(output)).unwrap() == before, "{output}");
+    }
+    let trace = ["--pipelines", "p.toml", "--inputs", "logs", "--trace", "logs/one.truth.json"];
+    compare(folder.path(), &trace).assert(2, &["is an input"]);
+}

@@ -4,7 +4,7 @@
 //! A limit of the size of files (`ulimit -f`) makes the write fail that crosses it, as on a full disk. It is raised block by block
 //! until all fits.
 
-use crate::support::{Ended, LogBuilder, TestMap, gridweave_program, start_program};
+use crate::support::{Ended, LogBuilder, SMALL_BUILDING, TestMap, gridweave_program, start_program};
 use gridweave_logs::map_file::{self, GridMap};
 use gridweave_logs::reader::LogFile;
 use std::fs;
@@ -73,6 +73,38 @@ fn map_files_whose_writing_fails_at_any_block_leave_the_earlier_ones() {
     }
     let args = ["merge", "a.yaml", "b.yaml", "-o", "merged.yaml"];
     fail_at_each_block(folder.path(), &args, &["merged.yaml", "merged.pgm"], 60);
+}
+
+#[test]
+fn of_several_outputs_of_a_run_none_is_replaced_if_one_cannot_be_written() {
+    let folder = TempDir::new().unwrap();
+    let TestMap { info, mut cells } = TestMap::filled(60, 50, 0.05, 0);
+    cells[..3 * 60].fill(100);
+    for name in ["a.yaml", "b.yaml"] {
+        map_file::save(&folder.path().join(name), &GridMap { info, cells: cells.clone() }).unwrap();
+    }
+    let outputs = ["merged.mcap", "map.yaml", "map.pgm", "merged.png", "summary.json"];
+    let merge = ["merge", "a.yaml", "b.yaml", "-o", "merged.mcap"];
+    let files = ["--map", "map.yaml", "--picture", "merged.png", "--summary", "summary.json"];
+    for engine in ["single", "threads"] {
+        let args = [&merge[..], &files[..], &["--engine", engine]].concat();
+        fail_at_each_block(folder.path(), &args, &outputs, 200);
+    }
+}
+
+#[test]
+fn a_simulation_whose_log_cannot_be_written_leaves_the_earlier_log_and_its_truth() {
+    let folder = TempDir::new().unwrap();
+    let outputs = ["s.mcap", "s.truth.json"].map(|name| folder.path().join(name));
+    outputs.iter().for_each(|output| fs::write(output, "earlier").unwrap());
+    let simulate = [&["simulate", "-o", "s.mcap"], &SMALL_BUILDING[..]].concat();
+    for blocks in [0, 16, 40] {
+        run_limited(folder.path(), blocks, &simulate).assert(1, &["cannot write the ", "s."]);
+        assert!(outputs.iter().all(|output| fs::read(output).unwrap() == b"earlier"), "{blocks} blocks");
+    }
+    assert!(!folder.path().join("s.truth.json.part").exists());
+    run_limited(folder.path(), 1_000_000, &simulate).assert(0, &[]);
+    assert!(outputs.iter().all(|output| fs::read(output).unwrap() != b"earlier"));
 }
 
 #[test]

@@ -167,6 +167,30 @@ fn a_map_frame_of_any_name_that_was_placed_before_its_map_came_has_one_parent() 
     }
 }
 
+#[test]
+fn the_world_of_the_input_is_not_placed_below_the_map_frames_that_this_run_places_in_it() {
+    let folder = TempDir::new().unwrap();
+    let placed = |parent: &str, child: &str| {
+        let transform =
+            TransformStamped { header: header(0.0, parent), child_frame_id: child.into(), ..Default::default() };
+        TFMessage { transforms: vec![transform] }
+    };
+    for (topic, world) in [("/tf_static", "world"), ("/tf", "/world")] {
+        let mut log = LogBuilder::new(&folder.path().join("in.mcap"));
+        log.message(0.0, topic, &placed("robot1/map", "robot1/odom")).message(
+            0.0,
+            topic,
+            &placed("robot1/odom", world),
+        );
+        log.map(1.0, "robot1", &TestMap::flat()).map(1.0, "robot2", &TestMap::flat());
+        log.finish();
+        let ended = gridweave(folder.path(), &["merge", "in.mcap", "-o", "out.mcap"]);
+        ended.assert(0, &["merged 2 of 2", "input transforms that place the frame `world` were dropped"]);
+        let frames = frames_with_one_parent(&folder.path().join("out.mcap"));
+        assert_eq!(frames, ["robot1/map", "robot1/odom", "robot2/map", "world_origin"]);
+    }
+}
+
 /// The frames that the transforms of a log place, each in one parent over the whole log.
 #[track_caller]
 fn frames_with_one_parent(log: &Path) -> Vec<String> {

@@ -67,13 +67,33 @@ fn a_trace_has_a_span_for_each_stage_and_message() {
     assert!(STAGES.iter().all(|stage| stages.contains(stage)), "{stages:?}");
     let received = begins.iter().filter(|event| event["name"] == "fuser" && event["args"]["from"].is_string()).count();
     assert_eq!(Some(received as u64), summary["stages"]["fuser"]["messages_in"].as_u64());
-    // A log that was meant to be read is not overwritten, and a full disk ends the trace and not the run.
-    let log = fs::read(folder.path().join("in.mcap")).unwrap();
-    gridweave(folder.path(), &[&merge[..], &["--trace", "in.mcap"]].concat()).assert(2, &["must end in .json"]);
-    assert!(fs::read(folder.path().join("in.mcap")).unwrap() == log);
-    std::os::unix::fs::symlink("/dev/full", folder.path().join("full.json")).unwrap();
-    let merge = gridweave(folder.path(), &[&merge[..], &["--trace", "full.json"]].concat());
-    merge.assert(0, &["the trace full.json is not complete: No space left on device"]);
+}
+
+#[test]
+fn a_trace_replaces_no_other_file_of_the_command_and_none_if_the_command_fails() {
+    let folder = TempDir::new().unwrap();
+    simulate(folder.path(), "in.mcap", &SMALL_BUILDING);
+    let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
+    let merge = ["merge", "in.mcap", "-o", "out.mcap", "--summary", "s.json"];
+    gridweave(folder.path(), &merge).assert(0, &[]);
+    let before = ["in.mcap", "in.truth.json", "s.json"].map(read);
+    fs::write(folder.path().join("old.json"), "old").unwrap();
+    for (args, trace, reasons) in [
+        (&merge[..], "in.mcap", &["must end in .json"][..]),
+        (&merge, "s.json", &["s.json", "--trace"]),
+        (&["evaluate", "s.json", "--truth", "in.truth.json"], "in.truth.json", &["in.truth.json", "--trace"]),
+        (&["evaluate", "s.json", "--truth=in.truth.json"], "./in.truth.json", &["in.truth.json", "--trace"]),
+        (&["simulate", "-o", "in.mcap"], "in.truth.json", &["would be written twice"]),
+        (&[&merge[..], &["--engine", "processes"]].concat(), "old.json", &["the engine `processes` has none"]),
+    ] {
+        gridweave(folder.path(), &[args, &["--trace", trace]].concat()).assert(2, reasons);
+    }
+    gridweave(folder.path(), &["merge", "none.mcap", "-o", "o.mcap", "--trace", "old.json"]).assert(1, &["none.mcap"]);
+    assert_eq!(read("old.json"), b"old");
+    assert!(["in.mcap", "in.truth.json", "s.json"].map(read) == before);
+    assert!(fs::read_dir(folder.path()).unwrap().all(|file| file.unwrap().path().extension() != Some("part".as_ref())));
+    gridweave(folder.path(), &[&merge[..], &["--trace", "old.json"]].concat()).assert(0, &[]);
+    assert!(serde_json::from_slice::<Value>(&read("old.json")).is_ok());
 }
 
 #[test]

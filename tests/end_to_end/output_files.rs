@@ -122,3 +122,13 @@ fn what_is_no_regular_file_is_refused_as_an_output_and_stays() {
     gridweave(folder.path(), &["run", "diamond.toml", "-o", OUTPUT]).assert(1, &["is not a regular file"]);
     assert!(fs::metadata(folder.path().join(OUTPUT)).unwrap().file_type().is_fifo());
 }
+
+#[test]
+fn the_pipeline_file_is_not_replaced_by_an_output() {
+    let folder = folder();
+    let file = folder.path().join("diamond.toml");
+    for outputs in [&["-o", "diamond.toml"][..], &["-o", OUTPUT, "--summary", "./diamond.toml"]] {
+        gridweave(folder.path(), &[&["run", "diamond.toml"], outputs].concat()).assert(2, &["is an input"]);
+        assert_eq!(fs::read_to_string(&file).unwrap(), DIAMOND);
+    }
+}

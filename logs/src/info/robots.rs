@@ -1,9 +1,10 @@
 //! The contents of a log by robot.
 
 use super::LogInfo;
-use crate::names::rename_advice;
+use crate::names::{rename_advice, scan_rename_advice};
 use crate::robots::{
-    Classified, InferredPoses, MapOrigin, MergedMaps, PoseSource, RobotChannels, Role, TagReader, pose_with_covariance,
+    Classified, InferredPoses, MapOrigin, MergedMaps, PoseSource, RobotChannels, Role, TagReader, is_scan,
+    pose_with_covariance,
 };
 use crate::schemas::full_type_name;
 use crate::tf::{TfPoses, is_static};
@@ -55,6 +56,8 @@ pub(super) struct RobotSurvey {
     mismatches: BTreeSet<String>,
     /// Topics with maps that belong to no robot.
     other_maps: BTreeSet<String>,
+    /// Topics with scans that belong to no robot.
+    other_scans: BTreeSet<String>,
     /// By robot: what is wrong with the first map that cannot be used, and how many such maps there are.
     unusable_maps: BTreeMap<String, (GridError, u64)>,
     merged_maps: MergedMaps,
@@ -86,6 +89,7 @@ impl RobotSurvey {
             topics,
             mismatches: BTreeSet::new(),
             other_maps: BTreeSet::new(),
+            other_scans: BTreeSet::new(),
             unusable_maps: BTreeMap::new(),
             merged_maps: MergedMaps::default(),
             map_frames: BTreeMap::new(),
@@ -106,6 +110,9 @@ impl RobotSurvey {
         match role {
             Role::Other if full_type_name(&channel.schema_name) == OccupancyGrid::NAME => {
                 self.other_maps.insert(channel.topic.clone());
+            }
+            Role::Other if is_scan(&full_type_name(&channel.schema_name)) => {
+                self.other_scans.insert(channel.topic.clone());
             }
             Role::Other | Role::Tf => {}
             _ => {
@@ -287,6 +294,11 @@ impl RobotSurvey {
             (advice, topics) => {
                 problems.push(format!("maps on {topics} do not fit `{pattern}`: give {}", advice.join(" ")));
             }
+        }
+        let scans = self.other_scans.iter().map(String::as_str);
+        if let Some(advice) = scan_rename_advice(scans, &self.topics.scan).filter(|_| has_no_map) {
+            problems
+                .push(format!("scans do not fit `{}`, and no map is built from them: give {advice}", self.topics.scan));
         }
         if let [robot] = robots.keys().collect::<Vec<_>>()[..]
             && advice.is_empty()

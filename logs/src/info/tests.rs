@@ -210,3 +210,13 @@ fn a_sampled_log_with_an_index_has_the_same_contents_as_a_completely_read_one() 
     std::fs::write(&path, bytes).unwrap();
     assert!(!read(0).is_sampled);
 }
+
+#[test]
+fn scans_on_topics_of_another_name_are_advised_to_be_renamed() {
+    let mut log = TestLog::new(layouts()[3].clone());
+    for robot in ["robot1", "robot2"] {
+        log.raw(&format!("/{robot}/front/scan"), "sensor_msgs/msg/LaserScan", 1, b"");
+    }
+    let problems = inspect_bytes(&log.finish()).problems.join("\n");
+    assert!(problems.contains("give --rename '/{robot}/front/scan=/{robot}/scan'"), "{problems}");
+}

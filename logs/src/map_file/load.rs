@@ -4,9 +4,11 @@ use super::description::Description;
 use super::reading::Thresholds;
 use super::shades::Shades;
 use super::{GridMap, MapFileError, MapFileWarning};
+use crate::file::folder_of;
 use gridweave_runtime::input_file;
 use gridweave_runtime::ros::{MapMetaData, Pose};
 use nalgebra::{Isometry2, Vector2};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// The maximum size of an image file, bytes.
@@ -34,7 +36,10 @@ pub fn load_as(yaml: &Path, thresholds: Thresholds) -> Result<(GridMap, Option<M
     let wrong = |message: String| MapFileError::Image { path: path.clone(), yaml: yaml.to_owned(), message };
     let shades = input_file::read(&path, LARGEST_IMAGE)
         .map_err(image::ImageError::from)
-        .and_then(|bytes| Shades::decode(&bytes))
+        .and_then(|bytes| match unreadable_type(&bytes) {
+            Some(why) => Err(io::Error::new(io::ErrorKind::InvalidData, why).into()),
+            None => Shades::decode(&bytes),
+        })
         .map_err(|error| wrong(error.to_string()))?;
     let (width, height) = shades.size();
     let origin = Pose::from(Isometry2::new(Vector2::new(x, y), yaw));
@@ -90,5 +95,41 @@ fn image_beside_yaml(named: &Path, yaml: &Path) -> Option<PathBuf> {
     let name = text.rsplit(['/', '\\']).next().filter(|name| !name.is_empty())?;
     let same_name = yaml.with_file_name(name);
     let as_yaml = IMAGE_ENDINGS.iter().map(|ending| yaml.with_extension(ending));
-    std::iter::once(same_name).chain(as_yaml).find(|image| image.is_file())
+    let images: Vec<PathBuf> = std::iter::once(same_name).chain(as_yaml).collect();
+    images.iter().find(|image| image.is_file()).cloned().or_else(|| in_other_case(&images))
+}
+
+/// The first of some images in one folder that is there under a name in other case: Windows and macOS take both for one.
+fn in_other_case(images: &[PathBuf]) -> Option<PathBuf> {
+    let lower_case = |path: &Path| path.file_name().and_then(|name| name.to_str()).map(str::to_lowercase);
+    let entries = std::fs::read_dir(folder_of(images.first()?)).ok()?;
+    let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    files.sort();
+    let found = |image: &PathBuf| {
+        let name = lower_case(image)?;
+        let file = files.iter().find(|file| lower_case(file).as_ref() == Some(&name) && file.is_file())?;
+        Some(image.with_file_name(file.file_name()?))
+    };
+    images.iter().find_map(found)
+}
+
+/// What a file is that is no image of a supported format, by its first bytes, and what would mend it; `None` if it may be one.
+fn unreadable_type(bytes: &[u8]) -> Option<String> {
+    const SUPPORTED: &str = "PGM, PPM, PBM, PNG, BMP and JPEG are read: convert it to one of these, such as PNG";
+    let formats: [(&[u8], &str); 5] = [
+        (b"II*\0", "a TIFF image"),
+        (b"MM\0*", "a TIFF image"),
+        (b"GIF8", "a GIF image"),
+        (b"RIFF", "a WebP image"),
+        (b"%PDF", "a PDF"),
+    ];
+    if let Some((_, what)) = formats.iter().find(|(start, _)| bytes.starts_with(start)) {
+        return Some(format!("it is {what}; {SUPPORTED}"));
+    }
+    if bytes.starts_with(b"version https://git-lfs") {
+        return Some("it is a pointer of Git LFS, and not the image; `git lfs pull` fetches that".to_owned());
+    }
+    let start = String::from_utf8_lossy(bytes.trim_ascii_start().get(..14).unwrap_or_default()).to_lowercase();
+    let is_page = start.starts_with("<!doctype html") || start.starts_with("<html");
+    is_page.then(|| "it is a page of HTML, and not the image; download the image itself".to_owned())
 }

@@ -1,7 +1,7 @@
 //! Writing a map.
 
 use super::{GridMap, MapFileError};
-use crate::file::replace;
+use crate::file::replace_or_leave;
 use gridweave_runtime::ros::cell::{is_free, is_occupied};
 use image::codecs::pnm::{PnmEncoder, PnmSubtype, SampleEncoding};
 use image::{ExtendedColorType, ImageEncoder, ImageError};
@@ -22,6 +22,11 @@ const FREE_THRESHOLD: f64 = 0.196;
 /// The mode is trinary: cells of 65 and more are occupied, 0 to 24 free, all others unknown. The origin is written in
 /// full precision; height, roll and pitch are dropped.
 pub fn save(yaml: &Path, map: &GridMap) -> Result<(), MapFileError> {
+    save_or_leave(yaml, map, false)
+}
+
+/// Writes a map as [`save`] does, or leaves both files as parts.
+pub(super) fn save_or_leave(yaml: &Path, map: &GridMap, leave_parts: bool) -> Result<(), MapFileError> {
     let (text, image, pixels) = describe(yaml, map)
         .map_err(|problem| MapFileError::Map { path: yaml.to_owned(), problem: problem.to_owned() })?;
     let mut file = Vec::with_capacity(pixels.len() + 32);
@@ -30,7 +35,7 @@ pub fn save(yaml: &Path, map: &GridMap) -> Result<(), MapFileError> {
     encoded.map_err(|error: ImageError| MapFileError::Map { path: yaml.to_owned(), problem: error.to_string() })?;
 
     // The image is written first, so that the YAML file never refers to a missing image.
-    Ok(replace(&[(&image, &file), (yaml, text.as_bytes())])?)
+    Ok(replace_or_leave(&[(&image, &file), (yaml, text.as_bytes())], leave_parts)?)
 }
 
 /// The image that [`save`] writes beside the YAML file at `yaml`.

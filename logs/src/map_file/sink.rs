@@ -1,6 +1,7 @@
 //! The stage `map_file_sink`.
 
-use super::{GridMap, save};
+use super::GridMap;
+use super::save::save_or_leave;
 use gridweave_runtime::message::Message;
 use gridweave_runtime::ros::OccupancyGrid;
 use gridweave_runtime::stage::{Context, Output, Parameters, Received, StageError, StageKind};
@@ -14,6 +15,9 @@ use std::path::PathBuf;
 struct MapFileSinkParameters {
     /// The YAML file to write; the image has the same name with the extension pgm. Existing files are replaced.
     file: PathBuf,
+    /// Whether the file is left as `FILE.part` when it is whole: the command renames the files of all stages together. Set by the
+    /// command.
+    leave_part: bool,
 }
 
 impl Parameters for MapFileSinkParameters {}
@@ -33,18 +37,20 @@ pub fn kind() -> StageKind {
 
 struct MapFileSink {
     file: PathBuf,
+    leave_part: bool,
     last: Option<Message>,
 }
 
 impl MapFileSink {
-    fn new(MapFileSinkParameters { file }: MapFileSinkParameters, _: &Context) -> Result<Self, StageError> {
+    fn new(parameters: MapFileSinkParameters, _: &Context) -> Result<Self, StageError> {
+        let MapFileSinkParameters { file, leave_part } = parameters;
         if file.as_os_str().is_empty() {
             let doing = "write the map file";
             return Err(
                 StageError::new(doing, "it has no file").with_help("give --map FILE.yaml or file = \"FILE.yaml\"")
             );
         }
-        Ok(Self { file, last: None })
+        Ok(Self { file, leave_part, last: None })
     }
 
     fn receive(&mut self, map: Received<'_, OccupancyGrid<'_>>, _: &Output<()>) -> Result<(), StageError> {
@@ -56,7 +62,7 @@ impl MapFileSink {
         let failed = |cause: &dyn std::fmt::Display| StageError::new("write the merged map", cause);
         let Some(message) = &self.last else { return Ok(()) };
         let grid: OccupancyGrid<'_> = message.decode().map_err(|error| failed(&error))?;
-        save(&self.file, &GridMap::from_message(&grid)).map_err(|error| failed(&error))?;
+        save_or_leave(&self.file, &GridMap::from_message(&grid), self.leave_part).map_err(|error| failed(&error))?;
         output.count("files", 1);
         Ok(())
     }

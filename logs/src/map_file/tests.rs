@@ -353,3 +353,26 @@ fn an_image_beside_the_file_is_read_where_the_path_is_one_of_another_machine() {
     fs::remove_file(folder.path().join("sub/map.pgm")).unwrap();
     assert!(load(&path).unwrap_err().to_string().contains("sub/map.pgm"), "the image that the file names");
 }
+
+#[test]
+fn an_image_of_another_format_says_what_it_is_and_one_in_other_case_is_found() {
+    let (folder, path) = folder(&yaml(""));
+    let image = folder.path().join("map.pgm");
+    let whole = fs::read(&image).unwrap();
+    for (bytes, reason) in [
+        (&b"II*\0..."[..], "it is a TIFF image; PGM, PPM, PBM, PNG, BMP and JPEG are read"),
+        (b"GIF89a", "it is a GIF image"),
+        (b"RIFF\x10\0\0\0WEBP", "it is a WebP image"),
+        (b"version https://git-lfs.github.com/spec/v1\n", "`git lfs pull`"),
+        (b"\n<!DOCTYPE html><html>", "it is a page of HTML"),
+    ] {
+        fs::write(&image, bytes).unwrap();
+        let error = load(&path).unwrap_err().to_string();
+        assert!(error.contains(reason), "{error}");
+    }
+    fs::remove_file(&image).unwrap();
+    fs::write(folder.path().join("Map.PGM"), whole).unwrap();
+    let (map, warning) = load_as(&path, Thresholds::Literal).unwrap();
+    assert_eq!(map.cells.len(), 6);
+    assert!(warning.unwrap().to_string().contains("Map.PGM"));
+}

@@ -29,7 +29,7 @@ pub use error::NameError;
 pub use file_names::{FileNameError, name_map_files, robot_names};
 pub use input::Input;
 pub use rename::TopicRename;
-pub use rename_advice::rename_advice;
+pub use rename_advice::{rename_advice, scan_rename_advice};
 pub use rules::{Convention, NameRules};
 pub(crate) use shared_frames::SharedFrames;
 

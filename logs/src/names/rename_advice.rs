@@ -1,4 +1,4 @@
-//! Advice on `--rename` for maps whose topics do not fit the pattern of the pipeline.
+//! Advice on `--rename` for maps and scans whose topics do not fit the pattern of the pipeline.
 
 use super::TopicRename;
 use gridweave_runtime::stage::match_robot;
@@ -6,6 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// The placeholder for the name of a robot in a topic.
 const ROBOT: &str = "{robot}";
+/// Parts of topics that say where on a robot a sensor is.
+const PLACES: [&str; 8] = ["front", "rear", "back", "left", "right", "top", "upper", "lower"];
 
 /// The options `--rename` that put the maps on `topics` under the names of their robots, where `pattern` is the topic that maps
 /// are expected on. Empty if two topics fit at least, or if the topics do not show which robots there are.
@@ -22,7 +24,7 @@ pub fn rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -
         return Vec::new();
     }
     if fitting.is_empty()
-        && let Some(template) = common_template(&others)
+        && let Some(template) = common_template(&others, "map")
     {
         return vec![format!("--rename '{template}={pattern}'")];
     }
@@ -46,13 +48,28 @@ pub fn rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -
     advice
 }
 
-/// The template with one part for the robot that most topics fit, two at the least.
-fn common_template(topics: &[&str]) -> Option<String> {
+/// The option `--rename` that puts the scans on `topics` under the names of their robots, where `pattern` is the topic that scans are
+/// expected on; `None` if a topic fits, or if the topics do not show which robots there are.
+pub fn scan_rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -> Option<String> {
+    let topics: BTreeSet<&str> = topics.collect();
+    if topics.iter().any(|topic| match_robot(pattern, topic).is_some()) {
+        return None;
+    }
+    let template = common_template(&topics.into_iter().collect::<Vec<_>>(), "scan")?;
+    Some(format!("--rename '{template}={pattern}'"))
+}
+
+/// The template with one part for the robot that most topics fit, two at the least. What is sought is called `what`.
+fn common_template(topics: &[&str], what: &str) -> Option<String> {
     let mut templates: BTreeMap<String, usize> = BTreeMap::new();
     for topic in topics {
         let parts: Vec<&str> = topic.split('/').collect();
         // The last part names what the topic carries, and the first is empty.
         for varying in 1..parts.len().saturating_sub(1) {
+            // The lidars of one robot are no robots.
+            if parts.get(varying).is_some_and(|part| PLACES.contains(part)) {
+                continue;
+            }
             let mut template = parts.clone();
             template[varying] = ROBOT;
             *templates.entry(template.join("/")).or_default() += 1;
@@ -60,7 +77,7 @@ fn common_template(topics: &[&str]) -> Option<String> {
     }
     let preference = |template: &str| {
         let last = template.rsplit('/').next().unwrap_or_default();
-        (last == "map", last.ends_with("_map"))
+        (last == what, last.ends_with(&format!("_{what}")))
     };
     let several = templates.into_iter().filter(|(_, count)| *count > 1);
     // Of equals the first by name.
@@ -117,6 +134,26 @@ mod tests {
         assert_eq!(advice(&["/a_map", "/b_map"]), renamed(&[("/a_map", "a"), ("/b_map", "b")]));
         assert_eq!(advice(&["/map", "/robot2/map"]), renamed(&[("/map", "robot1")]));
         assert_eq!(advice(&["/map", "/robot1/map"]), renamed(&[("/map", "robot2")]));
+    }
+
+    #[test]
+    fn scans_of_several_robots_have_one_option() {
+        let advice = |topics: &[&str]| scan_rename_advice(topics.iter().copied(), "/{robot}/scan");
+        for (topics, template) in [
+            (&["/robot1/front/scan", "/robot2/front/scan"][..], "/{robot}/front/scan"),
+            (&["/r1/front/scan", "/r1/rear/scan", "/r2/front/scan", "/r2/rear/scan"], "/{robot}/front/scan"),
+            (&["/robot1/scan_raw", "/robot2/scan_raw"], "/{robot}/scan_raw"),
+            (&["/robot1/base_scan", "/robot2/base_scan"], "/{robot}/base_scan"),
+            (&["/robot1/scan_echoes", "/robot2/scan_echoes"], "/{robot}/scan_echoes"),
+            (&["/fleet/a/scan", "/fleet/b/scan"], "/fleet/{robot}/scan"),
+        ] {
+            assert_eq!(advice(topics).unwrap(), format!("--rename '{template}=/{{robot}}/scan'"));
+        }
+        for topics in
+            [&["/a/scan", "/b/front/scan", "/c/front/scan"][..], &["/r/front/scan", "/r/rear/scan"], &["/scan"], &[]]
+        {
+            assert_eq!(advice(topics), None, "{topics:?}");
+        }
     }
 
     #[test]

@@ -25,7 +25,7 @@ pub use sink::{check_format, kind};
 pub use ways::ways;
 
 use crate::drawing::Drawing;
-use crate::file::replace;
+use crate::file::replace_or_leave;
 use colour::{FREE, OCCUPIED, UNKNOWN};
 use image::RgbImage;
 use layer::{Coverage, PlacedLayer};
@@ -107,7 +107,12 @@ impl Picture {
     /// # Errors
     /// The extension is not supported, the picture is too large, or the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), PictureError> {
-        Ok(replace(&[(path, &self.encode(path)?)])?)
+        self.save_or_leave(path, false)
+    }
+
+    /// Writes the picture as [`save`](Self::save) does, or leaves it as a part.
+    fn save_or_leave(&self, path: &Path, leave_part: bool) -> Result<(), PictureError> {
+        Ok(replace_or_leave(&[(path, &self.encode(path)?)], leave_part)?)
     }
 }
 

@@ -17,6 +17,9 @@ use std::path::{Path, PathBuf};
 struct PictureParameters {
     /// The file to write: PNG, SVG or PDF by its extension. An existing file is replaced.
     file: PathBuf,
+    /// Whether the file is left as `FILE.part` when it is whole: the command renames the files of all stages together. Set by the
+    /// command.
+    leave_part: bool,
 }
 
 impl Parameters for PictureParameters {}
@@ -38,6 +41,7 @@ pub fn kind() -> StageKind {
 
 struct PictureSink {
     file: PathBuf,
+    leave_part: bool,
     /// The last map of each robot; the merged map has an empty name.
     maps: BTreeMap<String, Message>,
     frames: RobotFrames,
@@ -46,14 +50,15 @@ struct PictureSink {
 }
 
 impl PictureSink {
-    fn new(PictureParameters { file }: PictureParameters, _: &Context) -> Result<Self, StageError> {
+    fn new(PictureParameters { file, leave_part }: PictureParameters, _: &Context) -> Result<Self, StageError> {
         if file.as_os_str().is_empty() {
             let doing = "draw the picture";
             return Err(StageError::new(doing, "it has no file")
                 .with_help("give --picture FILE.png (or .svg, .pdf) or file = \"FILE.png\""));
         }
         check_format(&file).map_err(|error| StageError::new("draw the merged map", error))?;
-        Ok(Self { file, maps: BTreeMap::new(), frames: RobotFrames::default(), topologies: BTreeMap::new() })
+        let (maps, topologies) = (BTreeMap::new(), BTreeMap::new());
+        Ok(Self { file, leave_part, maps, frames: RobotFrames::default(), topologies })
     }
 
     fn map(&mut self, map: Received<'_, OccupancyGrid<'_>>, _: &Output<()>) -> Result<(), StageError> {
@@ -73,7 +78,7 @@ impl PictureSink {
 
     fn write(&mut self, output: &Output<()>) -> Result<(), StageError> {
         if self.maps.contains_key("") {
-            let written = self.draw().and_then(|picture| picture.save(&self.file));
+            let written = self.draw().and_then(|picture| picture.save_or_leave(&self.file, self.leave_part));
             written.map_err(|error| StageError::new("draw the merged map", error))?;
             output.count("files", 1);
         }

@@ -86,10 +86,12 @@ pub enum ReadError {
         damage: super::Damage,
     },
     /// A folder is not a bag.
-    #[error("{}: the folder has neither a metadata.yaml with content nor an .mcap or .db3 file; give the log file itself", .path.display())]
+    #[error("{}: the folder has neither a metadata.yaml with content nor an .mcap or .db3 file; {advice}", .path.display())]
     NotABag {
         /// The folder.
         path: PathBuf,
+        /// What to give instead.
+        advice: String,
     },
     /// The metadata of a ROS 2 bag cannot be parsed.
     #[error("{}: not the metadata of a ROS 2 bag ({cause}); give its .mcap or .db3 files instead", .path.display())]

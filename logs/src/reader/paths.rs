@@ -2,11 +2,16 @@
 
 use super::error::ReadError;
 use crate::file::folder_of;
+use crate::map_file::image_of;
 use crate::yaml;
 use gridweave_runtime::input_file;
 use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
+
+/// The number of entries of a folder that is no bag that are looked at, and of those that are named.
+const MOST_ENTRIES: usize = 1000;
+const MOST_NAMED: usize = 5;
 
 /// `metadata.yaml` of a ROS 2 bag, limited to the needed fields.
 #[derive(Deserialize)]
@@ -64,9 +69,38 @@ fn undescribed_files(folder: &Path) -> Result<Vec<PathBuf>, ReadError> {
     }
     files.sort();
     match files.is_empty() {
-        true => Err(ReadError::NotABag { path: folder.to_owned() }),
+        true => Err(ReadError::NotABag { path: folder.to_owned(), advice: advice_in(folder) }),
         false => Ok(files),
     }
+}
+
+/// What to give instead of a folder that is no bag: the maps, bags or logs in it.
+fn advice_in(folder: &Path) -> String {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
+    let mut entries: Vec<PathBuf> = entries.collect();
+    entries.sort();
+    let is_called =
+        |path: &Path, ending: &str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending));
+    let is_map = |path: &Path| ["yaml", "yml"].iter().any(|ending| is_called(path, ending)) && image_of(path).is_ok();
+    let holds_log = |path: &Path| {
+        let mut inside = std::fs::read_dir(path).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
+        inside.any(|path| is_log(&path) || path.ends_with("metadata.yaml"))
+    };
+    let is_bag = |path: &Path| is_called(path, "bag") || path.is_dir() && holds_log(path);
+    let found = |what: &str, is_meant: &dyn Fn(&Path) -> bool| {
+        // A folder may hold thousands of other files.
+        let paths: Vec<String> = entries
+            .iter()
+            .take(MOST_ENTRIES)
+            .filter(|path| is_meant(path))
+            .map(|path| path.display().to_string())
+            .collect();
+        let more = if paths.len() > MOST_NAMED { " ..." } else { "" };
+        let named = paths.iter().take(MOST_NAMED).map(String::as_str).collect::<Vec<_>>().join(" ");
+        (!paths.is_empty()).then(|| format!("give the {what} in it: {named}{more}"))
+    };
+    let advice = found("maps", &is_map).or_else(|| found("bags", &is_bag));
+    advice.unwrap_or_else(|| "give the log file itself".to_owned())
 }
 
 fn described_files(description: &Path) -> Result<Vec<PathBuf>, ReadError> {

@@ -244,10 +244,12 @@ impl RobotChannels {
             return classified;
         }
         let (topic, length) = (shortened(&channel.topic), classified.robot.len());
-        let mismatch = format!(
-            "`{topic}` is not read as a robot's: the robot's name has {length} bytes, and at most {LONGEST_ROBOT_NAME} \
-             fit; rename the topic"
-        );
+        let why = match length > LONGEST_ROBOT_NAME {
+            true => format!("has {length} bytes, and at most {LONGEST_ROBOT_NAME} fit"),
+            false => "contains a zero byte".to_owned(),
+        };
+        let topic = topic.escape_debug();
+        let mismatch = format!("`{topic}` is not read as a robot's: the robot's name {why}; rename the topic");
         // Of a topic that is too long, it is said where its messages are dropped.
         Classified { role: Role::Other, robot: "", mismatch: (!name_fits).then_some(mismatch) }
     }
@@ -297,8 +299,13 @@ impl RobotChannels {
                 None => {
                     other.robot = robot;
                     let encoding = &channel.message_encoding;
-                    other.mismatch =
-                        Some(format!("`{topic}` fits `robots.{field}` but is encoded as `{encoding}`, not as `cdr`"));
+                    let cure = match encoding == "ros1" {
+                        true => "; give the ROS 1 bag (.bag) that the log was made from, which is read",
+                        false => "",
+                    };
+                    other.mismatch = Some(format!(
+                        "`{topic}` fits `robots.{field}` but is encoded as `{encoding}`, not as `cdr`{cure}"
+                    ));
                 }
             }
         }
@@ -319,9 +326,9 @@ impl RobotChannels {
     }
 }
 
-/// Whether the name of a robot fits in the header of a message.
-fn fits(robot: &str) -> bool {
-    robot.len() <= LONGEST_ROBOT_NAME
+/// Whether the name of a robot fits in the header of a message, where a zero byte ends it.
+pub(crate) fn fits(robot: &str) -> bool {
+    robot.len() <= LONGEST_ROBOT_NAME && !robot.contains('\0')
 }
 
 fn role_of_map(type_name: &str) -> Option<Role> {

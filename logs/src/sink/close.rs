@@ -3,7 +3,7 @@
 use super::output_log::{close_bag, is_ros1_bag};
 use super::rewrite::rewrite;
 use super::{LogOptions, LogWriteError, LogWriter, Outcome};
-use crate::file::OutputFile;
+use crate::file::{OutputFile, unlock_left};
 use crate::reader::OUTCOME_RECORD;
 use crate::reader::{Damage, LogFile, LogReader, ReadError};
 use mcap::MAGIC;
@@ -30,6 +30,7 @@ pub enum CloseError {
 /// # Errors
 /// The writer is alive, the partial file is not a log, or it cannot be written.
 pub fn close_log(path: &Path, reason: &str) -> Result<Option<PathBuf>, CloseError> {
+    unlock_left(path);
     let Some(mut output) = OutputFile::of_killed(path).map_err(LogWriteError::from)? else { return Ok(None) };
     if is_ros1_bag(path) {
         let end = LogFile::open(output.part()).ok().and_then(|file| file.damage().iter().find_map(end_of_records));

@@ -1,13 +1,18 @@
-//! Map frames that the run places in the world: transforms of the input must not give them another parent.
+//! Map frames that the run places in the world: transforms of the input must not give them another parent, nor one to the world.
 
 use crate::tf::MAP_FRAMES;
 use gridweave_runtime::message::Channel;
-use gridweave_runtime::ros::{RosMessage, TFMessage, decode, encode};
+use gridweave_runtime::ros::{RobotFrames, RosMessage, TFMessage, decode, encode};
 use gridweave_runtime::stage::{Context, match_robot};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Name of a robot's map frame, unless the pipeline, its map or a transform has another.
 const MAP_FRAME: &str = "{robot}/map";
+
+/// Why a transform of the input that places a map frame is left out.
+const PLACES_MAP: &str = "input transforms that place a robot's map frame were dropped: this run places it";
+/// Why one that places the world is left out: map frames in it would be above and below it.
+const PLACES_WORLD: &str = "input transforms that place the frame `world` were dropped: this run places the robots' maps in a frame of that name";
 
 /// The map frames of robots that the transforms of a run place.
 ///
@@ -59,23 +64,30 @@ impl GivenFrames {
         conflicts
     }
 
-    /// A message of input transforms without those that place such a frame, and the number of those; `None` if there
-    /// are none. The message is empty if no transform is left.
-    pub(crate) fn without(&mut self, transforms: &[u8]) -> Option<(Vec<u8>, usize)> {
+    /// A message of input transforms without those that place such a frame or the world, and why each of those is left out;
+    /// `None` if there are none. The message is empty if no transform is left.
+    pub(crate) fn without(&mut self, transforms: &[u8]) -> Option<(Vec<u8>, Vec<&'static str>)> {
         if self.patterns.is_empty() {
             return None;
         }
         let mut message = decode::<TFMessage>(transforms).ok()?;
         let fits = |frame: &str| self.patterns.iter().any(|pattern| match_robot(pattern, frame).is_some());
-        let before = message.transforms.len();
-        message.transforms.retain(|edge| !fits(&edge.child_frame_id) && !self.named.contains(&edge.child_frame_id));
-        let left_out = before - message.transforms.len();
+        let mut left_out = Vec::new();
+        message.transforms.retain(|edge| {
+            let child = edge.child_frame_id.trim_start_matches('/');
+            let reason = match child == RobotFrames::WORLD {
+                true => Some(PLACES_WORLD),
+                false => (fits(child) || self.named.contains(child)).then_some(PLACES_MAP),
+            };
+            left_out.extend(reason);
+            reason.is_none()
+        });
         for edge in &message.transforms {
             if !self.placed_by_input.contains_key(&edge.child_frame_id) {
                 self.placed_by_input.insert(edge.child_frame_id.clone(), edge.header.frame_id.clone());
             }
         }
-        if left_out == 0 {
+        if left_out.is_empty() {
             return None;
         }
         let bytes = if message.transforms.is_empty() { Vec::new() } else { encode(&message).ok()? };
@@ -124,7 +136,7 @@ mod tests {
         );
         let (rest, left_out) =
             frames.without(&transforms(&[("earth", "robot1/map"), ("robot1/map", "robot1/odom")])).unwrap();
-        assert_eq!((rest, left_out), (transforms(&[("robot1/map", "robot1/odom")]), 1));
+        assert_eq!((rest, left_out), (transforms(&[("robot1/map", "robot1/odom")]), vec![PLACES_MAP]));
         assert_eq!(frames.without(&transforms(&[("world", "robot2/map")])).unwrap().0, b"");
         assert_eq!(frames.without(b"cut"), None);
         assert_eq!(frames.learn(&transforms(&[("world", "grid_of_robot3")])), []);
@@ -164,6 +176,17 @@ mod tests {
         for frame in ["robot1/slam", "robot1/map"] {
             assert!(frames.without(&transforms(&[("earth", frame)])).is_some(), "{frame}");
         }
+    }
+
+    #[test]
+    fn the_world_gets_no_parent_from_the_input() {
+        let mut frames = frames(TFMessage::NAME);
+        for child in ["world", "/world"] {
+            let edges = transforms(&[("robot1/odom", child), ("robot1/map", "robot1/odom")]);
+            let rest = transforms(&[("robot1/map", "robot1/odom")]);
+            assert_eq!(frames.without(&edges), Some((rest, vec![PLACES_WORLD])), "{child}");
+        }
+        assert_eq!(frames.without(&transforms(&[("robot1/map", "worldly")])), None);
     }
 
     #[test]

@@ -75,6 +75,9 @@ pub struct SinkParameters {
     pub recorded_pipeline: String,
     /// The input files whose names, sizes and hashes are recorded in the log. Set by the command.
     pub recorded_files: Vec<PathBuf>,
+    /// Whether the file is left as `FILE.part` when it is whole: the command renames the files of all stages together. Set by the
+    /// command.
+    pub leave_part: bool,
 }
 
 impl Default for SinkParameters {
@@ -88,6 +91,7 @@ impl Default for SinkParameters {
             chunk_size,
             recorded_pipeline: String::new(),
             recorded_files: Vec::new(),
+            leave_part: false,
         }
     }
 }

@@ -76,6 +76,15 @@ impl OutputLog {
             Self::Ros1(bag) => bag.finish(outcome),
         }
     }
+
+    /// Ends the log, which is complete and stays at `NAME.part`.
+    pub(super) fn leave(self) -> Result<(), LogWriteError> {
+        let output = match self {
+            Self::Mcap(log) => log.end(Outcome::Complete),
+            Self::Ros1(bag) => bag.end(),
+        };
+        output.map(OutputFile::leave)
+    }
 }
 
 /// Closes the bag that a killed writer has left, of which the whole records end at `end`; it has no index. Returns its path.

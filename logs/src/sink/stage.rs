@@ -53,6 +53,8 @@ pub(super) struct McapSink {
     given_frames: GivenFrames,
     /// `None` after the log has ended or failed.
     log: Option<OutputLog>,
+    /// Whether the whole log is left as a part.
+    leave_part: bool,
     /// Whether anything was written: a run that fails at the start leaves no log.
     begun: bool,
     /// The pipeline, if it is still to be recorded.
@@ -75,6 +77,7 @@ impl McapSink {
             chunk_size,
             recorded_pipeline,
             recorded_files,
+            leave_part,
         } = parameters;
         if file.as_os_str().is_empty() {
             let doing = "write the log";
@@ -88,6 +91,7 @@ impl McapSink {
             inputs: context.inputs.clone(),
             given_frames: GivenFrames::new(context),
             log: Some(log),
+            leave_part,
             begun: false,
             recorded_pipeline: Some(recorded_pipeline).filter(|text| !text.is_empty()),
             recorded_files: (!recorded_files.is_empty()).then(|| InputHashes::start(recorded_files)),
@@ -212,7 +216,11 @@ impl McapSink {
             (Some(files), Outcome::Incomplete(_)) => files.stop(),
             (None, _) => {}
         }
-        log.finish(outcome).map(drop).map_err(failure)
+        match outcome {
+            Outcome::Complete if self.leave_part => log.leave(),
+            _ => log.finish(outcome).map(drop),
+        }
+        .map_err(failure)
     }
 }
 
@@ -257,11 +265,7 @@ impl McapSink {
                 Some(Target::Lane(lane)) => *lane,
                 Some(Target::Transforms(lane)) => {
                     if let Some((bytes, left_out)) = self.given_frames.without(message.bytes()) {
-                        for _ in 0..left_out {
-                            output.warn(
-                                "input transforms that place a robot's map frame were dropped: this run places it",
-                            );
-                        }
+                        left_out.into_iter().for_each(|reason| output.warn(reason));
                         if bytes.is_empty() {
                             return Ok(());
                         }

@@ -4,8 +4,8 @@ use super::channel::{Route, Stamp};
 use super::derived::Derived;
 use super::latched::Latch;
 use super::{RobotMessages, RobotReading};
-use crate::names::rename_advice;
-use crate::robots::{CellValues, MapOrigin, MergedMaps, RobotChannels, Role};
+use crate::names::{rename_advice, scan_rename_advice};
+use crate::robots::{CellValues, MapOrigin, MergedMaps, RobotChannels, Role, is_scan, tilt_of};
 use crate::schemas::full_type_name;
 use crate::tf::{MAP_FRAMES, is_static, tf_topic};
 use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
@@ -24,6 +24,8 @@ pub(super) struct ChannelRouter {
     /// The last map of each route whose origin is undecided: none live, where other maps may never be published.
     undecided: Vec<(usize, Stamp, Vec<u8>)>,
     holds_undecided: bool,
+    /// Topics of maps whose tilt was warned of.
+    tilted: BTreeSet<String>,
     routes: Vec<Route>,
     by_channel: BTreeMap<Channel, usize>,
     derived: Derived,
@@ -49,6 +51,7 @@ impl ChannelRouter {
             merged_maps: updates_maps.then(MergedMaps::default),
             undecided: Vec::new(),
             holds_undecided: true,
+            tilted: BTreeSet::new(),
             routes: Vec::new(),
             by_channel: BTreeMap::new(),
             map_frames: BTreeSet::new(),
@@ -227,13 +230,21 @@ impl ChannelRouter {
                 ));
                 route.send(stamp, data, &output.other, log_time)
             }
-            _ => match self.map_values.translate(data) {
-                Some((translated, notes)) => {
-                    notes.iter().for_each(|note| output.warn(format!("maps on `{topic}`: {note}")));
-                    route.send(stamp, &translated, &output.map, log_time)
+            _ => {
+                if !self.tilted.contains(topic)
+                    && let Some(tilt) = tilt_of(data)
+                {
+                    output.warn(format!("maps on `{topic}`: {tilt}"));
+                    self.tilted.insert(topic.clone());
                 }
-                None => route.send(stamp, data, &output.map, log_time),
-            },
+                match self.map_values.translate(data) {
+                    Some((translated, notes)) => {
+                        notes.iter().for_each(|note| output.warn(format!("maps on `{topic}`: {note}")));
+                        route.send(stamp, &translated, &output.map, log_time)
+                    }
+                    None => route.send(stamp, data, &output.map, log_time),
+                }
+            }
         }
     }
 
@@ -290,8 +301,12 @@ impl ChannelRouter {
 
     /// The topics of occupancy grids that have been seen.
     fn grid_topics(&self) -> impl Iterator<Item = &str> {
-        let is_grid = |route: &&Route| full_type_name(&route.channel.schema_name) == OccupancyGrid::NAME;
-        self.routes.iter().filter(is_grid).map(|route| route.channel.topic.as_str())
+        self.topics_of(|type_name| type_name == OccupancyGrid::NAME)
+    }
+
+    fn topics_of(&self, is_meant: fn(&str) -> bool) -> impl Iterator<Item = &str> {
+        let is_meant = move |route: &&Route| is_meant(&full_type_name(&route.channel.schema_name));
+        self.routes.iter().filter(is_meant).map(|route| route.channel.topic.as_str())
     }
 
     /// Warns of ports that are read and for which no message came.
@@ -314,6 +329,13 @@ impl ChannelRouter {
                 self.robots.map,
                 advice.join(" ")
             ));
+        }
+        if output.map.is_read()
+            && !routed(|role| matches!(role, Role::Map | Role::Scan))
+            && let Some(advice) = scan_rename_advice(self.topics_of(is_scan), &self.robots.scan)
+        {
+            let pattern = &self.robots.scan;
+            output.warn(format!("scans on topics that do not fit `{pattern}` are not used: give {advice}"));
         }
         if output.pose.is_read()
             && !routed(|role| matches!(role, Role::Pose(_)))

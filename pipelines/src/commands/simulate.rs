@@ -1,7 +1,7 @@
 //! `gridweave simulate`: simulates robots in a building, and writes a log and its truth.
 
 use crate::job::progress::Progress;
-use crate::job::{RunOptions, check_outputs};
+use crate::job::{Outputs, RunOptions, check_outputs};
 use crate::shipped;
 use crate::status::{BadUse, Status};
 use crate::terminal::print_line;
@@ -60,11 +60,16 @@ pub(crate) fn write_log(log: &Path, truth: &Path, mut overrides: Overrides, regi
     let file = truth.to_str().ok_or_else(|| BadUse(format!("the path {} is not UTF-8", truth.display())))?;
     let parameters = toml::Table::from_iter([("file".to_owned(), toml::Value::from(file))]);
     pipeline.attach(&truth::kind(), parameters, "truth", |_, _, _| true);
-    check_outputs(&pipeline, &RunOptions::default())?;
+    check_outputs(&pipeline, None, &RunOptions::default())?;
+    let outputs = Outputs::of(&mut pipeline);
     let progress = Progress::new(Mode::Replay);
     let report = engine::run(&pipeline, EngineKind::Threads, &progress);
     progress.finish();
-    Ok(report?)
+    let placed = report.map_err(anyhow::Error::from).and_then(|report| outputs.place(None).map(|()| report));
+    if let Err(error) = &placed {
+        outputs.close(&error.to_string());
+    }
+    placed
 }
 
 /// `a/b.mcap` -> `a/b.truth.json`.

@@ -3,6 +3,7 @@
 mod inputs;
 mod options;
 mod outputs;
+mod placing;
 pub(crate) mod progress;
 mod provenance;
 mod reading;
@@ -13,7 +14,8 @@ mod view;
 pub(crate) use inputs::{Inputs, is_yaml};
 pub(crate) use options::RunOptions;
 pub(crate) use outputs::check as check_outputs;
-pub(crate) use outputs::{check_is_no_input, check_mcap_ending};
+pub(crate) use outputs::{check_is_no_input, check_mcap_ending, is_same_name};
+pub(crate) use placing::Outputs;
 pub(crate) use reading::{NamingOptions, ReadingOptions};
 pub(crate) use view::STANDARD_VIEW;
 
@@ -22,11 +24,10 @@ use crate::shipped;
 use crate::status::{BadUse, Status};
 use crate::summary::RunSummary;
 use crate::terminal::{eprint_line, print, print_line, width};
+use crate::trace;
 use anyhow::Result;
 use gridweave_logs::bag::Bag;
-use gridweave_logs::file::replace;
 use gridweave_logs::names::name_map_files;
-use gridweave_logs::sink::close_log;
 use gridweave_runtime::engine::{self, EngineKind, Observer, RunError, RunReport, processes};
 use gridweave_runtime::pipeline::{Mode, Overrides, Pipeline};
 use gridweave_runtime::stage::Registry;
@@ -111,10 +112,13 @@ impl Job<'_> {
         if self.output == Output::MapOnly {
             pipeline.remove_sinks(LOG_SINK);
         }
-        outputs::check(&pipeline, self.options)?;
+        let file = Some(self.pipeline).filter(|file| file.exists());
+        outputs::check(&pipeline, file, self.options)?;
+        self.check_trace(&pipeline)?;
         provenance::record(&mut pipeline);
         let sinks = ResultSinks::attach(&mut pipeline, self.options)?;
         attach(&mut pipeline)?;
+        let outputs = Outputs::of(&mut pipeline);
         if let Some(address) = &self.options.view {
             let address = view::attach(&mut pipeline, self.registry, address)?;
             eprint_line(format_args!(
@@ -130,30 +134,46 @@ impl Job<'_> {
                 report
             }
         };
-        if let Err(error) = &report {
-            close_outputs(&pipeline, &error.to_string());
+        let written = report.map_err(anyhow::Error::from).and_then(|report| {
+            let summary = RunSummary::new(sinks.summary()?, &report);
+            let text = summary.to_json() + "\n";
+            outputs.place(self.options.summary.as_deref().map(|path| (path, text.as_str())))?;
+            Ok((report, summary))
+        });
+        if let Err(error) = &written {
+            outputs.close(&error.to_string());
         }
-        if let Some(bag) = bag.filter(|bag| report.is_ok() || bag.log().exists()) {
+        if let Some(bag) = bag.filter(|bag| written.is_ok() || bag.log().exists()) {
             bag.describe()?;
         }
-        let report = report?;
-        let summary = RunSummary::new(sinks.summary()?, &report);
-        if let Some(path) = &self.options.summary {
-            replace(&[(path, (summary.to_json() + "\n").as_bytes())])?;
-        }
+        let (report, summary) = written?;
         if pipeline.mode == Mode::Replay {
             summary.check_for_maps()?;
         }
-        sinks.check_written(&report)?;
+        sinks.check_written(&summary, &report)?;
         Ok(summary)
     }
 
-    fn engine_run(&self, pipeline: &Pipeline, observer: &dyn Observer) -> Result<Result<RunReport, RunError>> {
-        let by_mode = match pipeline.mode {
+    fn engine(&self, pipeline: &Pipeline) -> EngineKind {
+        self.options.engine.unwrap_or(match pipeline.mode {
             Mode::Replay => EngineKind::default(),
             Mode::Live => EngineKind::Processes,
-        };
-        Ok(match self.options.engine.unwrap_or(by_mode) {
+        })
+    }
+
+    /// Checks that a trace is not asked for of stages in other processes.
+    fn check_trace(&self, pipeline: &Pipeline) -> Result<(), BadUse> {
+        match trace::file() {
+            Some(file) if self.engine(pipeline) == EngineKind::Processes => Err(BadUse(format!(
+                "cannot write the trace {}: the engine `processes` has none; give --engine threads, or omit --trace",
+                file.display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    fn engine_run(&self, pipeline: &Pipeline, observer: &dyn Observer) -> Result<Result<RunReport, RunError>> {
+        Ok(match self.engine(pipeline) {
             EngineKind::Processes => processes::run(pipeline, &logging::launch()?, observer),
             engine => engine::run(pipeline, engine, observer),
         })
@@ -233,16 +253,4 @@ impl Job<'_> {
 fn text_of(path: &Path) -> Result<String> {
     let text = path.to_str().ok_or_else(|| BadUse(format!("the path {} is not UTF-8", path.display())))?;
     Ok(text.to_owned())
-}
-
-/// Closes the logs of sinks whose processes were killed, with the reason why they are not complete. Logs of other runs are
-/// locked, and what an earlier killed run had left was removed when this run began.
-fn close_outputs(pipeline: &Pipeline, reason: &str) {
-    for log in outputs::logs(pipeline) {
-        match close_log(&log, reason) {
-            Ok(Some(closed)) => tracing::info!("the incomplete log {} is in {}", log.display(), closed.display()),
-            Ok(None) => {}
-            Err(error) => tracing::warn!("cannot close the log {}: {error}", log.display()),
-        }
-    }
 }

@@ -2,6 +2,7 @@
 
 use super::options::RunOptions;
 use crate::status::BadUse;
+use crate::trace;
 use anyhow::{Result, bail};
 use gridweave_logs::file::{check_writable, resolve};
 use gridweave_logs::map_file;
@@ -10,15 +11,17 @@ use gridweave_logs::sink::is_ros1_bag;
 use gridweave_runtime::pipeline::Pipeline;
 use std::path::{Path, PathBuf};
 
-/// Checks all files that the sinks of a pipeline and the options name.
+/// Checks all files that the sinks of a pipeline and the options name, and the trace. `file` is that of the pipeline, if it has one.
 ///
 /// # Errors
 ///
 /// A log has the ending of another format. An output is an input, under whatever name, or is in the folder of one; two are the same; one is not writable, or is being
 /// written by another run.
-pub(crate) fn check(pipeline: &Pipeline, options: &RunOptions) -> Result<()> {
-    let inputs = inputs(pipeline);
-    let outputs = outputs(pipeline, options);
+pub(crate) fn check(pipeline: &Pipeline, file: Option<&Path>, options: &RunOptions) -> Result<()> {
+    let inputs: Vec<PathBuf> = inputs(pipeline).into_iter().chain(file.map(Path::to_owned)).collect();
+    let mut outputs = outputs(pipeline, options);
+    let files = outputs.len();
+    outputs.extend(trace::file().cloned());
     for (index, output) in outputs.iter().enumerate() {
         if inputs.iter().any(|input| is_or_holds(input, output)) {
             return Err(is_an_input(output));
@@ -33,8 +36,8 @@ pub(crate) fn check(pipeline: &Pipeline, options: &RunOptions) -> Result<()> {
         }
     }
     logs(pipeline).iter().try_for_each(|log| check_log_ending(log))?;
-    // The last check, as it removes what killed runs have left.
-    outputs.iter().try_for_each(|output| check_writable(output))?;
+    // The last check, as it removes what killed runs have left. The trace is being written.
+    outputs[..files].iter().try_for_each(|output| check_writable(output))?;
     Ok(())
 }
 
@@ -139,7 +142,7 @@ fn outputs(pipeline: &Pipeline, options: &RunOptions) -> Vec<PathBuf> {
 }
 
 /// Lists the files in a parameter of the stages of a kind: one, or a list.
-fn files_of(pipeline: &Pipeline, kind: &str, parameter: &str) -> Vec<PathBuf> {
+pub(super) fn files_of(pipeline: &Pipeline, kind: &str, parameter: &str) -> Vec<PathBuf> {
     let stages = pipeline.stages.iter().filter(|stage| stage.kind.name == kind);
     let values = stages.filter_map(|stage| stage.parameters.get(parameter));
     let texts = values.flat_map(|value| match value {
@@ -156,7 +159,7 @@ fn is_or_holds(input: &Path, output: &Path) -> bool {
 }
 
 /// Whether two paths name the same file, which may not exist.
-fn is_same_name(one: &Path, other: &Path) -> bool {
+pub(crate) fn is_same_name(one: &Path, other: &Path) -> bool {
     matches!((resolve(one), resolve(other)), (Ok(one), Ok(other)) if one == other || same_file(&one, &other))
 }
 

@@ -3,6 +3,7 @@
 
 use super::options::RunOptions;
 use crate::status::BadUse;
+use crate::summary::RunSummary;
 use anyhow::{Context, Result, bail};
 use gridweave_logs::summary::Summary;
 use gridweave_logs::{map_file, picture, summary};
@@ -70,12 +71,12 @@ impl ResultSinks {
     }
 
     /// Checks that the merged map was written and drawn.
-    pub(super) fn check_written(&self, report: &RunReport) -> Result<()> {
+    pub(super) fn check_written(&self, summary: &RunSummary, report: &RunReport) -> Result<()> {
         let counts = report.stages.iter().filter_map(|stage| stage.counts.get("files"));
         if counts.sum::<u64>() < self.files {
-            bail!(
-                "there is no merged map to write or to draw: nothing was sent on {MERGED}, as all cells of the maps are unknown"
-            );
+            // No stage says of itself that it has sent nothing; why is in what was warned of.
+            let warnings = summary.warnings().map(|(_, what, _)| format!("\n  {what}")).collect::<String>();
+            bail!("there is no merged map to write or to draw: nothing was sent on {MERGED}{warnings}");
         }
         Ok(())
     }

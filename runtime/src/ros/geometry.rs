@@ -44,9 +44,13 @@ impl Quaternion {
         Self { x: 0.0, y: 0.0, z: (yaw / 2.0).sin(), w: (yaw / 2.0).cos() }
     }
 
-    /// The rotation about the vertical axis, radians in `(-pi, pi]`. It is 0 for four zeros, which many programs write for "no
-    /// rotation".
+    /// The rotation about the vertical axis, radians in `(-pi, pi]`, whatever the norm. It is 0 for four zeros, which many programs
+    /// write for "no rotation", and not a number for others whose norm is too small or too large to be computed.
     pub fn yaw(&self) -> f64 {
+        let Self { x, y, z, w } = *self;
+        if !(w * w + x * x + y * y + z * z).is_normal() && [x, y, z, w] != [0.0; 4] {
+            return f64::NAN;
+        }
         let sine = 2.0 * (self.w * self.z + self.x * self.y);
         let cosine = self.w * self.w + self.x * self.x - self.y * self.y - self.z * self.z;
         sine.atan2(cosine)
@@ -151,3 +155,19 @@ pub struct TFMessage {
 
 ros_messages!("geometry_msgs": PoseStamped, PoseWithCovarianceStamped);
 ros_messages!("tf2_msgs": TFMessage);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_yaw_of_a_scaled_quaternion_is_that_of_the_whole_and_one_beyond_all_scales_has_none() {
+        let Quaternion { x, y, z, w } = Quaternion::from_yaw(0.7);
+        let scaled = |by: f64| Quaternion { x: by * x, y: by * y, z: by * z, w: by * w }.yaw();
+        for by in [1e-9, 0.5, 1.0, 7.0, 1e9] {
+            assert!((scaled(by) - 0.7).abs() < 1e-12, "{by}");
+        }
+        assert_eq!(scaled(0.0), 0.0);
+        assert!([1e-170, 1e-200, 1e200, f64::NAN].into_iter().all(|by| scaled(by).is_nan()));
+    }
+}

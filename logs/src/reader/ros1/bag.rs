@@ -137,7 +137,11 @@ impl Walk {
         }
         // Checked above.
         let Ok(channel) = u16::try_from(self.connections.len() + 1) else { return };
-        let topic = header.text("topic").or_else(|| data_header.text("topic")).unwrap_or_default();
+        let mut topic = header.text("topic").or_else(|| data_header.text("topic")).unwrap_or_default();
+        // A name without a slash at its beginning is relative to the root, as in `rosbag play`.
+        if !topic.starts_with('/') {
+            topic.insert(0, '/');
+        }
         let schema_name = type_name(&data_header.text("type").unwrap_or_default());
         let definition = data_header.bytes("message_definition").unwrap_or_default();
         let definition = if definition.len() <= self.definitions_left { definition } else { &[] };

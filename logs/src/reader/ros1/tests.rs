@@ -218,3 +218,13 @@ fn unreadable_messages_are_counted_and_the_rest_is_read() {
     assert!(damage.contains(&Damage::LostMessages { count: 1 }), "{damage:?}");
     assert!(damage.contains(&Damage::BadChunk { fault: ChunkFault::UnknownCompression("lzo".into()) }), "{damage:?}");
 }
+
+#[test]
+fn a_topic_without_a_slash_at_its_beginning_gets_one() {
+    let folder = Folder::new();
+    let contents = message(0, 1, &pose(1.0));
+    let bag = Bag::new(true).chunk("none", &contents, &[1]);
+    let path = folder.write("a.bag", &bag.end(&[connection(0, "robot1/pose", "geometry_msgs/PoseStamped", POSE)]));
+    let (messages, damage) = read_file(&path).unwrap();
+    assert_eq!((messages[0].0.as_str(), messages.len(), damage.len()), ("/robot1/pose", 1, 0));
+}

@@ -21,6 +21,28 @@ fn missing_and_empty_files_have_different_errors() {
 }
 
 #[test]
+fn a_folder_of_maps_or_of_bags_is_an_error_that_names_them() {
+    let folder = Folder::new();
+    assert!(error(folder.path()).to_string().ends_with("give the log file itself"));
+    let bag = folder.write("one.bag", b"");
+    let inner = folder.path().join("two");
+    std::fs::create_dir(&inner).unwrap();
+    std::fs::write(inner.join("two_0.mcap"), b"").unwrap();
+    let text = error(folder.path()).to_string();
+    let expected = format!("give the bags in it: {} {}", bag.display(), inner.display());
+    assert!(text.ends_with(&expected), "{text}");
+    folder.write("params.yaml", b"a: 1");
+    let maps: Vec<String> = (0..6)
+        .map(|number| {
+            let text = b"image: a.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n";
+            folder.write(&format!("map{number}.yaml"), text).display().to_string()
+        })
+        .collect();
+    let text = error(folder.path()).to_string();
+    assert!(text.ends_with(&format!("give the maps in it: {} ...", maps[..5].join(" "))), "{text}");
+}
+
+#[test]
 fn another_file_type_is_reported_with_a_fix() {
     let folder = Folder::new();
     let text = error(folder.write("a.bag", b"#ROSBAG V1.2\n\x45\0\0\0op=\x03")).to_string();

@@ -205,10 +205,18 @@ impl BagWriter {
     /// # Errors
     /// The file cannot be written or renamed.
     pub(in crate::sink) fn finish(mut self, outcome: Outcome<'_>) -> Result<PathBuf, LogWriteError> {
-        self.close_chunk()?;
         if matches!(outcome, Outcome::Incomplete(_)) {
+            self.close_chunk()?;
             return Ok(self.output.put_in_free_place()?);
         }
+        let path = self.path.clone();
+        self.end()?.put_in_place()?;
+        Ok(path)
+    }
+
+    /// Ends the complete bag with an index. It stays at `NAME.part`.
+    pub(in crate::sink) fn end(mut self) -> Result<OutputFile, LogWriteError> {
+        self.close_chunk()?;
         let place = self.length;
         let mut bytes: Vec<u8> = self.connections.iter().flat_map(|connection| &connection.record).copied().collect();
         for chunk in &self.chunks {
@@ -225,9 +233,7 @@ impl BagWriter {
         let first = self.first_record(place);
         let written = self.file.write_all_at(&first, MAGIC.len() as u64);
         written.map_err(|error| LogWriteError::from_io(&self.path, error))?;
-        let path = self.path;
-        self.output.put_in_place()?;
-        Ok(path)
+        Ok(self.output)
     }
 
     /// The first record, with the place of the index; 0 for none.

@@ -1,6 +1,7 @@
 //! Maps that are not those of map servers: other cell values, merged maps of other programs.
 
 use super::*;
+use gridweave_runtime::ros::Quaternion;
 use std::collections::BTreeSet;
 
 fn map<'a>(frame: &str, data: &'a [u8]) -> OccupancyGrid<'a> {
@@ -86,4 +87,54 @@ fn maps_that_are_all_in_the_world_are_those_of_robots() {
         }
     };
     assert_eq!(read(&alone, "").on("map").len(), 3, "what stays undecided is sent at the end");
+}
+
+#[test]
+fn a_name_with_a_zero_byte_is_no_robots_and_takes_no_name_of_another() {
+    let log = |log: &mut TestLog| {
+        for (second, topic) in [(1, "/a\0b/map"), (2, "/a/map"), (3, "/a\0c/map")] {
+            log.add(topic, OccupancyGrid::NAME, second, &map("map", &[0, 0, 100, 0]));
+        }
+    };
+    let run = read(&log, "");
+    assert_eq!(run.times("map"), [2]);
+    for topic in ["/a\\0b/map", "/a\\0c/map"] {
+        let warning =
+            format!("`{topic}` is not read as a robot's: the robot's name contains a zero byte; rename the topic");
+        assert!(run.warnings.contains_key(&warning), "{:?}", run.warnings);
+    }
+}
+
+#[test]
+fn an_origin_with_roll_or_pitch_is_warned_of_once_for_each_robot() {
+    let turned = |x: f64, z: f64, w: f64| {
+        let mut map = map("map", &[0, 0, 100, 0]);
+        map.info.origin.orientation = Quaternion { x, y: 0.0, z, w };
+        map
+    };
+    let log = |log: &mut TestLog| {
+        for second in 1..3 {
+            log.add("/flipped/map", OccupancyGrid::NAME, second, &turned(1.0, 0.0, 0.0));
+            log.add("/tilted/map", OccupancyGrid::NAME, second, &turned(0.05, 0.0, 1.0));
+            log.add("/scaled/map", OccupancyGrid::NAME, second, &turned(0.0, 3.0, 4.0));
+            log.add("/zero/map", OccupancyGrid::NAME, second, &turned(0.0, 0.0, 0.0));
+            log.add("/tiny/map", OccupancyGrid::NAME, second, &turned(0.0, 1e-170, 1e-170));
+        }
+    };
+    let run = read(&log, "");
+    assert_eq!(run.on("map").len(), 10);
+    let about = |robot: &str| {
+        let mut warnings = run.warnings.iter().filter(|(text, _)| text.contains(&format!("`/{robot}/map`")));
+        warnings.next().map(|(text, count)| (text.clone(), *count))
+    };
+    let (flipped, times) = about("flipped").unwrap();
+    assert!(flipped.contains("would be a mirror image") && times == 1, "{flipped}");
+    let (tilted, times) = about("tilted").unwrap();
+    assert!(tilted.contains("5.7 degrees") && times == 1, "{tilted}");
+    assert!(about("tiny").unwrap().0.contains("too small"));
+    assert_eq!((about("scaled"), about("zero")), (None, None));
+    for message in run.on("map").iter().filter(|message| ["scaled", "tiny"].contains(&message.robot())) {
+        let map: OccupancyGrid<'_> = message.decode().unwrap();
+        assert_eq!(map.check().is_ok(), message.robot() == "scaled");
+    }
 }

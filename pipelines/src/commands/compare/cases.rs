@@ -34,6 +34,8 @@ pub(super) struct Case {
     /// The robot whose frame is the world; `None` leaves the choice to the pipeline.
     pub(super) reference: Option<String>,
     pub(super) truth: Truth,
+    /// The files of the user that it is made of.
+    pub(super) files: Vec<PathBuf>,
 }
 
 /// An entry of `pairs.json`.
@@ -124,7 +126,8 @@ impl Finder<'_> {
         };
         check_truth(&truth)?;
         let name = log.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Case { name, input, log: log.to_owned(), reference: None, truth: Truth::Frames(truth) })
+        let files = vec![log.to_owned(), truth.clone()];
+        Ok(Case { name, input, log: log.to_owned(), reference: None, truth: Truth::Frames(truth), files })
     }
 
     /// Writes each pair of map files that a folder lists as a log.
@@ -144,7 +147,8 @@ impl Finder<'_> {
             let (input, truth) =
                 (input.display().to_string(), Truth::Places { robots: robots.clone(), places: pair.truth });
             let [a, _] = robots;
-            Ok(Case { name: pair.pair, input, log, reference: Some(a), truth })
+            let files = files.into_iter().chain([path.clone()]).collect();
+            Ok(Case { name: pair.pair, input, log, reference: Some(a), truth, files })
         };
         listed.into_iter().enumerate().map(case).collect()
     }

@@ -113,7 +113,8 @@ mod tests {
 
     fn case(name: &str, input: &str) -> Case {
         let truth = Truth::Frames(PathBuf::new());
-        Case { name: name.into(), input: input.into(), log: PathBuf::new(), reference: None, truth }
+        let files = Vec::new();
+        Case { name: name.into(), input: input.into(), log: PathBuf::new(), reference: None, truth, files }
     }
 
     fn result(pipeline: usize, case: usize, robots: &[(RobotOutcome, f64)]) -> MergeResult {
