@@ -5,9 +5,9 @@
 //! 3. [`registration`]: hypotheses from the maps alone, their refinement, and the judgement of all;
 //! 4. [`merge`]: one pose for each robot, and one map.
 //!
-//! [`simulator`] and [`python_stage`] are stages of their own, and [`shared`] is what the rooms have in common. A stage is
-//! a folder: the algorithm as plain functions on slices and nalgebra types, and beside it `stage.rs`, the thin adapter
-//! that turns messages into calls.
+//! [`simulator`] and [`python_stage`] are stages of their own, and [`shared`] is what the rooms have in common. A stage
+//! is a folder: the algorithm as plain functions on slices and nalgebra types, and beside it `stage.rs`, the thin
+//! adapter that turns messages into calls.
 
 #![forbid(unsafe_code)]
 

@@ -1,5 +1,5 @@
-//! What the end-to-end tests, the torture and the program that draws golden inputs have in common: logs and maps that are made
-//! up, and what runs do to the machine.
+//! What the end-to-end tests, the torture and the program that draws golden inputs have in common: logs and maps that
+//! are made up, and what runs do to the machine.
 
 #![allow(clippy::unwrap_used)]
 

@@ -1,9 +1,10 @@
 //! Drives past tags of which all is known: odometry that drifts, ranges and bearings with outliers, and tags that a
 //! camera sees.
 //!
-//! They have the shapes of public logs: that of UTIAS (Leung, Halpern, Barfoot and Liu, "The UTIAS multi-robot cooperative
-//! localization and mapping dataset", 2011), whose robots see landmarks in a hall by a camera, and that of Plaza (Djugash, Hamner
-//! and Roth, "Navigating with ranging radios", 2009), where radio ranges of tens of metres have outliers; both without maps.
+//! They have the shapes of public logs: that of UTIAS (Leung, Halpern, Barfoot and Liu, "The UTIAS multi-robot
+//! cooperative localization and mapping dataset", 2011), whose robots see landmarks in a hall by a camera, and that of
+//! Plaza (Djugash, Hamner and Roth, "Navigating with ranging radios", 2009), where radio ranges of tens of metres have
+//! outliers; both without maps.
 
 use crate::{LogBuilder, header};
 use gridweave_runtime::ros::{PoseStamped, TFMessage, Transform, TransformStamped, Vector3, encode};
@@ -28,16 +29,17 @@ pub enum Sense {
         /// Share of all ranges.
         outliers: f64,
     },
-    /// It perceives in which direction they are by antennas that look to the left, with this standard deviation in radians; this
-    /// share of the bearings are any. A reading is a `sensor_msgs/msg/JointState` whose only joint is the tag, its position the
-    /// bearing in degrees and clockwise.
+    /// It perceives in which direction they are by antennas that look to the left, with this standard deviation in
+    /// radians; this share of the bearings are any. A reading is a `sensor_msgs/msg/JointState` whose only joint is the
+    /// tag, its position the bearing in degrees and clockwise.
     Bearings {
         /// Radians.
         stddev: f64,
         /// Share of all bearings.
         outliers: f64,
     },
-    /// It sees where they are, with this standard deviation per metre of distance: tags of the AprilTag family `tag36h11`.
+    /// It sees where they are, with this standard deviation per metre of distance: tags of the AprilTag family
+    /// `tag36h11`.
     Camera {
         /// Metres per metre.
         stddev: f64,

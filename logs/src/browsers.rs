@@ -1,7 +1,7 @@
 //! Connections of browsers: a limited number of them, each with time limits, and the requests that they send.
 //!
-//! A client may send nothing, or slowly, or without end, or not read what it is sent. None of that takes more than a connection
-//! for a while.
+//! A client may send nothing, or slowly, or without end, or not read what it is sent. None of that takes more than a
+//! connection for a while.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
@@ -182,8 +182,8 @@ impl Connection {
         self.stream.local_addr()
     }
 
-    /// Relays between the browser and a server until either closes, or the browser does not read for a while. `first` is what the
-    /// browser has sent already.
+    /// Relays between the browser and a server until either closes, or the browser does not read for a while. `first`
+    /// is what the browser has sent already.
     ///
     /// # Errors
     /// The server cannot be reached, or a thread cannot be started.

@@ -60,7 +60,8 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Checks that a file can be written at `path`. Changes nothing, except that the part of a killed writer is removed, with a warning.
+/// Checks that a file can be written at `path`. Changes nothing, except that the part of a killed writer is removed,
+/// with a warning.
 ///
 /// # Errors
 /// It cannot be written.
@@ -236,7 +237,8 @@ fn places(path: &Path) -> Result<(PathBuf, PathBuf), WriteError> {
     match fs::symlink_metadata(&place) {
         Ok(metadata) if metadata.is_dir() => return Err(of_path(ErrorKind::IsADirectory.into())),
         Ok(metadata) if !metadata.is_file() => return Err(WriteError::NotRegular { path: path.to_owned() }),
-        // A read-only file must not be replaced either, nor one that a running program has locked: the part of another output.
+        // A read-only file must not be replaced either, nor one that a running program has locked: the part of another
+        // output.
         Ok(_) => {
             let file = options().open(&place).map_err(of_path)?;
             if matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))

@@ -16,15 +16,16 @@ pub(crate) fn file() -> io::Result<File> {
     tempfile::tempfile().map_err(|error| in_words(&error))
 }
 
-/// A name for a file without one, for libraries that need it. It is removed on drop; programs that have it open can still read
-/// it.
+/// A name for a file without one, for libraries that need it. It is removed on drop; programs that have it open can
+/// still read it.
 pub(crate) struct Name {
     _folder: TempDir,
     path: PathBuf,
 }
 
 impl Name {
-    /// Gives a name to a temporary file that was opened here. On file systems without names for such files, it is copied.
+    /// Gives a name to a temporary file that was opened here. On file systems without names for such files, it is
+    /// copied.
     pub(crate) fn of(file: &File) -> io::Result<Self> {
         let private = fs::Permissions::from_mode(0o700);
         let made = tempfile::Builder::new().prefix("gridweave-").permissions(private).tempdir();

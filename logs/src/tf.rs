@@ -22,11 +22,12 @@ pub fn is_static(topic: &str) -> bool {
     topic.ends_with("tf_static")
 }
 
-/// The key in the metadata of an announced channel of transforms under which a source names the map frames of robots, a line
-/// for each. A sink needs them before the first transform, and maps may come late.
+/// The key in the metadata of an announced channel of transforms under which a source names the map frames of robots, a
+/// line for each. A sink needs them before the first transform, and maps may come late.
 pub(crate) const MAP_FRAMES: &str = "gridweave_map_frames";
 
-/// The maximum number of transforms between two frames, as in tf2. More are no robot, and each message would follow all of them.
+/// The maximum number of transforms between two frames, as in tf2. More are no robot, and each message would follow all
+/// of them.
 const LONGEST_PATH: usize = 1000;
 
 /// The latest transform of each frame to its parent.
@@ -74,7 +75,8 @@ impl FrameTree {
         true
     }
 
-    /// The pose of the frame `source` in the frame `target`; `None` if they are not connected, or by more than 1000 transforms.
+    /// The pose of the frame `source` in the frame `target`; `None` if they are not connected, or by more than 1000
+    /// transforms.
     pub fn lookup(&self, target: &str, source: &str) -> Option<Isometry3<f64>> {
         self.chain(target, source).map(|chain| chain.transform_target_source)
     }

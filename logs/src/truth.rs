@@ -14,8 +14,8 @@ use std::path::PathBuf;
 struct TruthParameters {
     /// The JSON file to write. An existing file is replaced.
     file: PathBuf,
-    /// Whether the file is left as `FILE.part` when it is whole: the command renames the files of all stages together. Set by the
-    /// command.
+    /// Whether the file is left as `FILE.part` when it is whole: the command renames the files of all stages together.
+    /// Set by the command.
     leave_part: bool,
 }
 
@@ -50,8 +50,8 @@ impl TruthSink {
     }
 }
 
-/// `resolution`, `frames` (robot to x, y, yaw), `tags` (id to x, y), `note`, `centres` (robot to x, y) and `common` (x and y in
-/// the second robot's map, and in the first's).
+/// `resolution`, `frames` (robot to x, y, yaw), `tags` (id to x, y), `note`, `centres` (robot to x, y) and `common` (x
+/// and y in the second robot's map, and in the first's).
 fn to_json(truth: &SimulationTruth) -> Value {
     fn object<T>(entries: &[T], entry: impl Fn(&T) -> (&String, Value)) -> Value {
         entries.iter().map(entry).map(|(name, value)| (name.clone(), value)).collect::<Map<_, _>>().into()

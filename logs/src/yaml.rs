@@ -8,8 +8,8 @@ const DEEPEST: usize = 64;
 /// Parses a text.
 ///
 /// # Errors
-/// It is no YAML of this type, or its brackets are nested too deeply: libyaml looks at all open ones at each token, so a text of
-/// nothing but brackets would take a time that grows with its square.
+/// It is no YAML of this type, or its brackets are nested too deeply: libyaml looks at all open ones at each token, so
+/// a text of nothing but brackets would take a time that grows with its square.
 pub(crate) fn parse<T: DeserializeOwned>(text: &str) -> Result<T, String> {
     let mut depth = 0_usize;
     for (number, line) in text.lines().enumerate() {

@@ -2,9 +2,10 @@
 //!
 //!     GRIDWEAVE_LOGS=FOLDER cargo bench -p gridweave --bench live
 //!
-//! It starts `pipelines/live.toml` with a second sink, ten stages in all. Idle: the processor time of all its processes over ten
-//! seconds, before and after messages were sent. Latency: `FOLDER/intel-2.mcap` (a simulated log, without a folder) is played
-//! repeatedly; the time from when a map is sent on `robots.map` to when the merged map from it is sent on `fuser.map`.
+//! It starts `pipelines/live.toml` with a second sink, ten stages in all. Idle: the processor time of all its processes
+//! over ten seconds, before and after messages were sent. Latency: `FOLDER/intel-2.mcap` (a simulated log, without a
+//! folder) is played repeatedly; the time from when a map is sent on `robots.map` to when the merged map from it is
+//! sent on `fuser.map`.
 
 // A bench that cannot go on may panic.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]

@@ -2,8 +2,8 @@
 //!
 //!     GRIDWEAVE_LOGS=FOLDER cargo bench -p gridweave --bench replay
 //!
-//! Without a folder of logs it simulates one. The reference, in the same run, is a copy of the log by the `mcap` crate (read,
-//! decompress, compress, write), which is the least that any tool with an MCAP output does.
+//! Without a folder of logs it simulates one. The reference, in the same run, is a copy of the log by the `mcap` crate
+//! (read, decompress, compress, write), which is the least that any tool with an MCAP output does.
 
 // A bench that cannot go on may panic.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]

@@ -1,7 +1,8 @@
 //! How the program does with little address space (`ulimit -v`): its threads reserve less of it.
 //!
-//! The allocator of the C library sets aside 64 MB for each thread, of which little is used. Within a limit that leaves nothing for
-//! what is needed, and then the program ends with a signal. With one arena for all threads it sets aside nothing.
+//! The allocator of the C library sets aside 64 MB for each thread, of which little is used. Within a limit that leaves
+//! nothing for what is needed, and then the program ends with a signal. With one arena for all threads it sets aside
+//! nothing.
 
 use anyhow::Context;
 use rustix::process::{Resource, getrlimit};
@@ -24,8 +25,8 @@ const LOOP_THREAD: u64 = 8 << 20;
 /// The number of threads beside those of parallel loops and of prefetching.
 const OTHER_THREADS: u64 = 8;
 
-/// Keeps within a limit of the address space, if there is one that threads might reach. The allocator reads its settings at the start
-/// of a program, so the program starts once more, in its own place.
+/// Keeps within a limit of the address space, if there is one that threads might reach. The allocator reads its
+/// settings at the start of a program, so the program starts once more, in its own place.
 ///
 /// # Errors
 /// The threads of parallel loops cannot be started.

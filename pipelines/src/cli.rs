@@ -108,7 +108,8 @@ impl Command {
 }
 
 impl Cli {
-    /// Runs the command, whose command line has these words, with the given stage kinds. `on_warning` is called for each warning.
+    /// Runs the command, whose command line has these words, with the given stage kinds. `on_warning` is called for
+    /// each warning.
     pub(crate) fn execute(self, words: &[OsString], registry: &Registry, on_warning: fn(&str, &str)) -> Result<Status> {
         let trace = self.logging.start(words, on_warning)?;
         let done = self.run(registry);

@@ -1,4 +1,5 @@
-//! Distances between common places, which two robots have both seen, in a merge; the truth of a log with deformed maps lists them.
+//! Distances between common places, which two robots have both seen, in a merge; the truth of a log with deformed maps
+//! lists them.
 
 use gridweave_logs::summary::{DeformationSummary, Frame, Summary};
 use gridweave_runtime::ros::{DeformationNode, MapDeformation};
@@ -25,16 +26,16 @@ pub struct CommonPlaces {
     pub from_best: Option<FromBest>,
 }
 
-/// Error of the frames of two robots against the best rigid fit of their common places. Deformed maps have no exact rigid frames,
-/// so this fit is what a merge can be measured against.
+/// Error of the frames of two robots against the best rigid fit of their common places. Deformed maps have no exact
+/// rigid frames, so this fit is what a merge can be measured against.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct FromBest {
     /// Error at the middle of the places, metres.
     pub metres: f64,
     /// Error of the direction, degrees, 0 to 180.
     pub degrees: f64,
-    /// Normalised squared error in x, y and yaw by the covariance in the summary; none if the first robot is not the reference, or
-    /// there is no covariance. With a correct covariance 95 % are below 7.81, and the mean is 3.
+    /// Normalised squared error in x, y and yaw by the covariance in the summary; none if the first robot is not the
+    /// reference, or there is no covariance. With a correct covariance 95 % are below 7.81, and the mean is 3.
     pub normalised_error_squared: Option<f64>,
     /// Distances by the best rigid fit.
     pub best: Distances,

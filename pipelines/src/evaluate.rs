@@ -1,11 +1,13 @@
 //! Errors of a merge against the truth.
 //!
-//! A robot counts as **right** if the pose of its map is within 0.5 m and 1 degree of the truth, the distance taken at the
-//! middle of its last map, and as **wrong** otherwise. A robot that the run did not merge is **refused**. For unrelated
-//! robots (the truth has no frames) refusal is right, and every merged robot is wrong. The reference robot is not counted.
+//! A robot counts as **right** if the pose of its map is within 0.5 m and 1 degree of the truth, the distance taken at
+//! the middle of its last map, and as **wrong** otherwise. A robot that the run did not merge is **refused**. For
+//! unrelated robots (the truth has no frames) refusal is right, and every merged robot is wrong. The reference robot is
+//! not counted.
 //!
-//! Where the truth lists places that two robots have both seen (`common`), their distances in the merge are measured, by the rigid
-//! frames and with the deformations, and the error of the frames against the best rigid fit of these places.
+//! Where the truth lists places that two robots have both seen (`common`), their distances in the merge are measured,
+//! by the rigid frames and with the deformations, and the error of the frames against the best rigid fit of these
+//! places.
 
 use crate::common_places::{self, CommonPlace, CommonPlaces, normalised_error_squared, pose};
 use crate::merge_text::short;
@@ -52,8 +54,8 @@ pub struct RobotResult {
     pub error_m: Option<f64>,
     /// Error of its direction, degrees, 0 to 180; none if there is nothing to compare.
     pub error_deg: Option<f64>,
-    /// Normalised squared error of its frame in x, y and yaw by the covariance in the summary; none if there is nothing to
-    /// compare, or no covariance. With a correct covariance 95 % are below 7.81, and the mean is 3.
+    /// Normalised squared error of its frame in x, y and yaw by the covariance in the summary; none if there is nothing
+    /// to compare, or no covariance. With a correct covariance 95 % are below 7.81, and the mean is 3.
     pub normalised_error_squared: Option<f64>,
     /// Why it is not merged.
     #[serde(skip_serializing_if = "Option::is_none")]

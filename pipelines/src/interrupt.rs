@@ -14,8 +14,8 @@ pub(crate) const OUTPUT_IS_CLOSED: &str = "the output is being closed";
 /// Signals that end a program at once by default, other than SIGINT, SIGTERM and SIGHUP.
 const OTHERS: [Signal; 4] = [Signal::SIGQUIT, Signal::SIGUSR1, Signal::SIGUSR2, Signal::SIGALRM];
 
-/// Blocks the signals that would end the program at once, until [`stop_on_interrupt`] is called. Must be called before other
-/// threads are started.
+/// Blocks the signals that would end the program at once, until [`stop_on_interrupt`] is called. Must be called before
+/// other threads are started.
 pub(crate) fn hold_back() {
     let mut signals: SigSet = OTHERS.into_iter().collect();
     // A file that exceeds its size limit is an error of the write.
@@ -25,8 +25,8 @@ pub(crate) fn hold_back() {
     }
 }
 
-/// Makes a signal set the returned flag, so that the program can end in order; `what_follows` is printed. A second signal ends the
-/// program at once.
+/// Makes a signal set the returned flag, so that the program can end in order; `what_follows` is printed. A second
+/// signal ends the program at once.
 pub(crate) fn stop_on_interrupt(what_follows: &'static str) -> &'static AtomicBool {
     static HANDLER: AtomicBool = AtomicBool::new(false);
     if !HANDLER.swap(true, Ordering::Relaxed) {

@@ -42,14 +42,14 @@ use std::ffi::OsString;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
-/// Runs the command line with the stage kinds of Gridweave and the given ones; of two kinds with one name the given one counts.
-/// The exit status is 0 if all is done, 1 if it failed, 2 for bad use, and 3 if something could not be merged.
+/// Runs the command line with the stage kinds of Gridweave and the given ones; of two kinds with one name the given one
+/// counts. The exit status is 0 if all is done, 1 if it failed, 2 for bad use, and 3 if something could not be merged.
 pub fn command(kinds: impl IntoIterator<Item = StageKind>) -> ExitCode {
     command_with(kinds, &[], |_, _| {})
 }
 
-/// Runs the command line as [`command`] does, with further verbs, and calls `on_warning` for each warning of this process, with its
-/// module and its text.
+/// Runs the command line as [`command`] does, with further verbs, and calls `on_warning` for each warning of this
+/// process, with its module and its text.
 pub fn command_with(
     kinds: impl IntoIterator<Item = StageKind>,
     verbs: &[Verb],
@@ -62,7 +62,8 @@ pub fn command_with(
     ExitCode::from(command_line(std::env::args_os(), kinds, verbs, on_warning))
 }
 
-/// Runs the command line with the given arguments, the name of the program first, as [`command_with`] does. Returns the exit status.
+/// Runs the command line with the given arguments, the name of the program first, as [`command_with`] does. Returns the
+/// exit status.
 pub fn command_line(
     arguments: impl IntoIterator<Item = OsString>,
     kinds: impl IntoIterator<Item = StageKind>,

@@ -1,4 +1,5 @@
-//! Logging of a command: events of the libraries as lines on standard error, and a trace of the work of every stage for a viewer.
+//! Logging of a command: events of the libraries as lines on standard error, and a trace of the work of every stage for
+//! a viewer.
 
 use crate::terminal::eprint_line;
 use crate::trace::{Trace, TraceWriter};
@@ -27,8 +28,8 @@ pub(crate) struct LoggingArgs {
     /// The format of the log lines.
     #[arg(long, global = true, value_enum, default_value_t = LogFormat::Text, value_name = "FORMAT")]
     log_format: LogFormat,
-    /// Write a trace of the work of every stage, with every message, for Perfetto (ui.perfetto.dev) or chrome://tracing. Not
-    /// with the engine `processes`.
+    /// Write a trace of the work of every stage, with every message, for Perfetto (ui.perfetto.dev) or
+    /// chrome://tracing. Not with the engine `processes`.
     #[arg(long, global = true, value_name = "FILE.json")]
     pub(crate) trace: Option<PathBuf>,
 }
@@ -58,7 +59,8 @@ enum LogFormat {
 }
 
 impl LoggingArgs {
-    /// Starts logging for a command line of these words. `on_warning` is called for each warning with its module and text.
+    /// Starts logging for a command line of these words. `on_warning` is called for each warning with its module and
+    /// text.
     pub(crate) fn start(&self, words: &[OsString], on_warning: fn(&str, &str)) -> Result<Option<Trace>> {
         let (trace, writer) = self.trace.as_deref().map(|path| Trace::create(path, words)).transpose()?.unzip();
         let (layer, guard) = writer.map(trace_layer).unzip();
@@ -140,8 +142,8 @@ impl<S: Subscriber> Layer<S> for WarningLayer {
 /// Viewers that were refused try again and again; they are advised once.
 static ADVISED: Once = Once::new();
 
-/// What to do about a viewer that the server of the stage `foxglove_sink` has refused, if a warning is about one. The server
-/// does not tell the viewer why.
+/// What to do about a viewer that the server of the stage `foxglove_sink` has refused, if a warning is about one. The
+/// server does not tell the viewer why.
 fn refused_viewer(module: &str, text: &str) -> Option<&'static str> {
     let is_refusal = module.starts_with("foxglove::") && text.ends_with(": handshake failed");
     is_refusal.then_some(

@@ -14,8 +14,8 @@ fn in_one_line(name: &str) -> String {
     name.replace('\n', "\\u000a").replace('\r', "\\u000d")
 }
 
-/// Writes the poses of the maps, the robots that are not merged with reasons, and the decision on each pair, in lines of at
-/// most `width` columns.
+/// Writes the poses of the maps, the robots that are not merged with reasons, and the decision on each pair, in lines
+/// of at most `width` columns.
 pub(crate) fn write_merge(out: &mut String, merge: &Summary, width: Option<usize>) -> std::fmt::Result {
     if let Some(reference) = merge.reference.as_deref().map(in_one_line) {
         let merged = merge.frames.len();
@@ -108,8 +108,8 @@ fn frames_table(frames: &BTreeMap<String, Frame>) -> Table {
     table
 }
 
-/// Makes the table of the largest displacement and rotation of each map, its size, and the thickness spread and share of
-/// double walls before and after.
+/// Makes the table of the largest displacement and rotation of each map, its size, and the thickness spread and share
+/// of double walls before and after.
 fn deformations_table(deformations: &BTreeMap<String, DeformationSummary>) -> Table {
     let mut table = Table::new(["robot", "max m", "max deg", "size m", "wall spread m", "double walls"]);
     for (robot, deformation) in deformations {

@@ -1,4 +1,5 @@
-//! Merging maps and running pipelines from a program, as `gridweave merge` and `gridweave run` do it from the command line.
+//! Merging maps and running pipelines from a program, as `gridweave merge` and `gridweave run` do it from the command
+//! line.
 //!
 //! ```no_run
 //! use gridweave::merging::{MergeRequest, merge_files};
@@ -58,7 +59,8 @@ pub struct Merged {
     pub map: Option<GridMap>,
 }
 
-/// Merges the maps in files: logs, or map files of nav2's map server, each the map of the robot that is called as the file.
+/// Merges the maps in files: logs, or map files of nav2's map server, each the map of the robot that is called as the
+/// file.
 ///
 /// # Errors
 /// A file cannot be read, has no map, or the request is wrong; or the observer stops the run.
@@ -71,7 +73,8 @@ pub fn merge_files(files: &[PathBuf], request: &MergeRequest, observer: &dyn Obs
     request.run(pipeline, (files, Inputs::of(files)?), request.log_or(Output::MapOnly), [], observer)
 }
 
-/// Runs a pipeline file, or the shipped pipeline of that name, on files, with the stage kinds of Gridweave and the given ones.
+/// Runs a pipeline file, or the shipped pipeline of that name, on files, with the stage kinds of Gridweave and the
+/// given ones.
 ///
 /// # Errors
 /// The pipeline or the request is wrong, or a stage fails; or the observer stops the run.
@@ -88,7 +91,8 @@ pub fn run_pipeline(
 /// Merges maps that are in memory, each with the name of its robot.
 ///
 /// # Errors
-/// Two maps have the same name, a name is no part of a topic, there is no map, or the request is wrong; or the observer stops the run.
+/// Two maps have the same name, a name is no part of a topic, there is no map, or the request is wrong; or the observer
+/// stops the run.
 pub fn merge_maps(
     maps: Vec<(String, Arc<GridMap>)>,
     request: &MergeRequest,

@@ -4,7 +4,8 @@ use gridweave_runtime::pipeline::{Overrides, Pipeline, PipelineErrors, suggest};
 use gridweave_runtime::stage::{Registry, StageKind};
 use std::path::Path;
 
-/// Makes the registry of the stage kinds of Gridweave and the given ones; of two kinds with one name the given one counts.
+/// Makes the registry of the stage kinds of Gridweave and the given ones; of two kinds with one name the given one
+/// counts.
 pub fn registry(kinds: impl IntoIterator<Item = StageKind>) -> Registry {
     Registry::new(gridweave_logs::kinds().into_iter().chain(gridweave_stages::kinds()).chain(kinds))
 }

@@ -1,7 +1,7 @@
 //! Tables in plain text.
 //!
-//! `comfy-table` does not fit: it would break type and topic names within narrow columns, where here columns that do not fit stand
-//! below the others, and it gives no lines by row, between which reasons are printed.
+//! `comfy-table` does not fit: it would break type and topic names within narrow columns, where here columns that do
+//! not fit stand below the others, and it gives no lines by row, between which reasons are printed.
 
 mod layout;
 
@@ -45,8 +45,8 @@ impl Table {
         self.rows.iter().map(|row| row.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n").collect()
     }
 
-    /// Formats the table in lines of at most `width` columns of the terminal, or of any width if there is none. Texts are wrapped
-    /// within their columns; columns that do not fit beside the others stand below them, indented.
+    /// Formats the table in lines of at most `width` columns of the terminal, or of any width if there is none. Texts
+    /// are wrapped within their columns; columns that do not fit beside the others stand below them, indented.
     pub fn fit(&self, width: Option<usize>) -> String {
         self.fit_rows(width).concat()
     }

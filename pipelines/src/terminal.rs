@@ -1,9 +1,10 @@
 //! Printing of results to standard output and of messages to standard error, and the width of the terminal.
 //!
-//! All that is printed goes through here, where characters that a terminal obeys are escaped: names in logs may have them.
+//! All that is printed goes through here, where characters that a terminal obeys are escaped: names in logs may have
+//! them.
 //!
-//! Either may be closed, or may lead to a full disk. A reader of the results that has closed its end is no failure; results that
-//! cannot be written are one; messages that cannot be written are dropped.
+//! Either may be closed, or may lead to a full disk. A reader of the results that has closed its end is no failure;
+//! results that cannot be written are one; messages that cannot be written are dropped.
 
 use anyhow::{Context, Result};
 use gridweave_runtime::pipeline::TEXT_WIDTH;
@@ -45,8 +46,8 @@ pub(crate) fn eprint_styled_line(text: impl Display) {
     let _ = writeln!(io::stderr(), "{}", escape_all_but_styles(&text.to_string()));
 }
 
-/// The greatest width of a line of the results, columns: `COLUMNS` or else the width of the terminal. `None` for a pipe or a
-/// file, so that programs read whole lines.
+/// The greatest width of a line of the results, columns: `COLUMNS` or else the width of the terminal. `None` for a pipe
+/// or a file, so that programs read whole lines.
 pub(crate) fn width() -> Option<usize> {
     let given = std::env::var("COLUMNS").ok().and_then(|columns| columns.trim().parse().ok());
     let measured = || terminal_size::terminal_size_of(io::stdout()).map(|(width, _)| usize::from(width.0));

@@ -4,7 +4,8 @@ pub(crate) use gridweave_runtime::pipeline::wrap_words;
 
 use textwrap::core::display_width;
 
-/// Wraps a line at spaces to at most `width` columns. The first line keeps its indentation, the others are indented by `indent`.
+/// Wraps a line at spaces to at most `width` columns. The first line keeps its indentation, the others are indented by
+/// `indent`.
 pub(crate) fn wrap(line: &str, indent: usize, width: Option<usize>) -> String {
     wrapped(line, indent, width).join("\n")
 }

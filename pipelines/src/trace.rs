@@ -1,4 +1,5 @@
-//! The file of a trace of the work of the stages. It is written as a part beside it, which takes its name when the command has ended.
+//! The file of a trace of the work of the stages. It is written as a part beside it, which takes its name when the
+//! command has ended.
 
 use crate::job::is_same_name;
 use crate::status::BadUse;
@@ -50,8 +51,8 @@ impl Trace {
     /// Creates the part of the trace at `path` for a command line of these words.
     ///
     /// # Errors
-    /// Its name does not end in .json, as another kind of file could be named in error; another word names the same file; or
-    /// it cannot be written.
+    /// Its name does not end in .json, as another kind of file could be named in error; another word names the same
+    /// file; or it cannot be written.
     pub(crate) fn create(path: &Path, words: &[OsString]) -> Result<(Self, TraceWriter)> {
         if path.extension().is_none_or(|ending| ending != "json") {
             let text = format!("cannot write the trace {}: its name must end in .json", path.display());
@@ -78,8 +79,8 @@ impl Trace {
         Self { writing: Some(guard), ..self }
     }
 
-    /// Ends the trace. It replaces an earlier file only if the command `is_done`; that of a command that failed stays as a part
-    /// where there is such a file, and is removed if there is nothing in it.
+    /// Ends the trace. It replaces an earlier file only if the command `is_done`; that of a command that failed stays
+    /// as a part where there is such a file, and is removed if there is nothing in it.
     pub(crate) fn end(self, is_done: bool) {
         let Self { output, progress, writing, .. } = self;
         drop(writing);
@@ -99,7 +100,8 @@ impl Trace {
     }
 }
 
-/// Whether a word of a command line, or what follows `=` in it, names the file `trace`, apart from that of the option `--trace`.
+/// Whether a word of a command line, or what follows `=` in it, names the file `trace`, apart from that of the option
+/// `--trace`.
 fn is_named(trace: &Path, words: &[OsString]) -> bool {
     let is_it = |word: &OsStr| is_same_name(trace, Path::new(word));
     let mut words = words.iter().skip(1);

@@ -4,8 +4,8 @@ use crate::commands::live::settings;
 use anyhow::Result;
 use std::time::Duration;
 
-/// A verb that a program adds to the command line: it takes the parameters of a stage, observes something for a while, and
-/// prints what it has found.
+/// A verb that a program adds to the command line: it takes the parameters of a stage, observes something for a while,
+/// and prints what it has found.
 #[derive(Clone, Copy, Debug)]
 pub struct Verb {
     /// Its name.

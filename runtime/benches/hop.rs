@@ -1,5 +1,5 @@
-//! The latency of one hop between two stages by message size: from the last byte written by the sender to the delivery of the
-//! message to the reader, including the wake-up.
+//! The latency of one hop between two stages by message size: from the last byte written by the sender to the delivery
+//! of the message to the reader, including the wake-up.
 //!
 //!     cargo bench -p gridweave-runtime --bench hop
 //!

@@ -2,8 +2,8 @@
 //!
 //!     cargo bench -p gridweave-runtime --bench processes
 //!
-//! A hop is from the last byte written by the sender to the delivery of the message to the reader, including the wake-up. The
-//! reference is bare iceoryx2 between two processes in the same run: the same payload, a listener.
+//! A hop is from the last byte written by the sender to the delivery of the message to the reader, including the
+//! wake-up. The reference is bare iceoryx2 between two processes in the same run: the same payload, a listener.
 
 // A bench that fails just stops.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
@@ -29,7 +29,8 @@ use std::time::Duration;
 
 const SIZES: [usize; 4] = [64, 64 << 10, 1 << 20, 16 << 20];
 const HOPS: u64 = 100;
-/// The number of runs of each kind, alternating: the result depends on the cores on which the kernel places the processes.
+/// The number of runs of each kind, alternating: the result depends on the cores on which the kernel places the
+/// processes.
 const ROUNDS: usize = 9;
 /// The pause between hops, after which the reader sleeps.
 const PAUSE: Duration = Duration::from_millis(2);
@@ -65,7 +66,8 @@ impl Times {
         self.hops.push(now.saturating_sub(written));
     }
 
-    /// The number of messages, the median and the 99th percentile of their latencies in nanoseconds, and messages per second.
+    /// The number of messages, the median and the 99th percentile of their latencies in nanoseconds, and messages per
+    /// second.
     fn report(&self) -> Report {
         let mut hops = self.hops.clone();
         hops.sort_unstable();

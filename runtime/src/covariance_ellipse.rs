@@ -12,9 +12,11 @@ pub struct CovarianceEllipse {
 }
 
 impl CovarianceEllipse {
-    /// The ellipse of so many standard deviations. `None` if the covariance is not finite, or is too large to be reckoned with.
+    /// The ellipse of so many standard deviations. `None` if the covariance is not finite, or is too large to be
+    /// reckoned with.
     ///
-    /// The eigenvalues of a symmetric matrix of two rows have a closed form: nothing is to converge, whatever the numbers.
+    /// The eigenvalues of a symmetric matrix of two rows have a closed form: nothing is to converge, whatever the
+    /// numbers.
     pub fn new(covariance: &Matrix2<f64>, deviations: f64) -> Option<Self> {
         let (sum, difference) = (covariance.m11 + covariance.m22, covariance.m11 - covariance.m22);
         let mixed = covariance.m12 + covariance.m21;

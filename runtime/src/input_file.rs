@@ -8,8 +8,8 @@ use std::io::{self, ErrorKind, Read};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
-/// The most bytes of a text that is read whole: a pipeline file, a summary, a description of a map or of a bag. Real ones
-/// have some thousands.
+/// The most bytes of a text that is read whole: a pipeline file, a summary, a description of a map or of a bag. Real
+/// ones have some thousands.
 pub const LONGEST_TEXT: u64 = 16 << 20;
 
 /// Opens a file for reading.
@@ -42,7 +42,8 @@ pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     }
 }
 
-/// Reads a whole text of at most [`LONGEST_TEXT`] bytes: UTF-8, or UTF-16 with a byte order mark, as some editors write it.
+/// Reads a whole text of at most [`LONGEST_TEXT`] bytes: UTF-8, or UTF-16 with a byte order mark, as some editors write
+/// it.
 ///
 /// # Errors
 /// As [`read`]; or it is not such text.

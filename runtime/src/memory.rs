@@ -1,13 +1,13 @@
 //! The memory that this process may still take.
 //!
-//! Linux grants more memory than there is, and ends a process that uses it. So whoever is about to take much, at the word of a
-//! file, asks first.
+//! Linux grants more memory than there is, and ends a process that uses it. So whoever is about to take much, at the
+//! word of a file, asks first.
 
 use rustix::process::{Resource, getrlimit};
 use std::fs;
 
-/// The number of bytes that this process may still take: of the machine, of its control group, and of its own limit. `None` if the
-/// system does not say.
+/// The number of bytes that this process may still take: of the machine, of its control group, and of its own limit.
+/// `None` if the system does not say.
 pub fn available() -> Option<u64> {
     let text = |path: &str| fs::read_to_string(path).ok();
     let machine = text("/proc/meminfo").and_then(|text| of_machine(&text));

@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
-/// The text with each character that a terminal obeys, or that hides the order of others, as `\u` and four hexadecimal digits: as
-/// in JSON, of which no string has another value by that. Line ends and tabs stay.
+/// The text with each character that a terminal obeys, or that hides the order of others, as `\u` and four hexadecimal
+/// digits: as in JSON, of which no string has another value by that. Line ends and tabs stay.
 pub fn escape(text: &str) -> Cow<'_, str> {
     escape_if(text, |_| false)
 }
@@ -35,8 +35,8 @@ fn escape_if(text: &str, stays: impl Fn(&str) -> bool) -> Cow<'_, str> {
     Cow::Owned(escaped)
 }
 
-/// Whether a terminal obeys the character: a control character of ASCII or of ISO 8859, or one that changes the direction of
-/// text.
+/// Whether a terminal obeys the character: a control character of ASCII or of ISO 8859, or one that changes the
+/// direction of text.
 fn is_obeyed(character: char) -> bool {
     let changes_direction =
         matches!(character, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');

@@ -4,8 +4,9 @@
 //!
 //! `python3` in PATH, or what `GRIDWEAVE_PYTHON` names, must have the package of `pipelines/python`.
 //!
-//! - Through a pipeline of a source, the stage and a sink, on the engine `threads`: how long a message takes from the source to
-//!   the sink where the next is sent only then, and how many a second go through where the source sends as fast as it can.
+//! - Through a pipeline of a source, the stage and a sink, on the engine `threads`: how long a message takes from the
+//!   source to the sink where the next is sent only then, and how many a second go through where the source sends as
+//!   fast as it can.
 //! - The call alone, without links.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]

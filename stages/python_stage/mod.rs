@@ -1,8 +1,8 @@
 //! `python`: a stage that is written in Python.
 //!
-//! The package `gridweave` in [`pipelines/python`](../../pipelines/python/STAGES.md) is the other side: asked by `python -m gridweave.describe
-//! MODULE`, it prints the ports and parameters of the stage, and `python -m gridweave.program MODULE FOLDER` is its program. The
-//! protocol between the two is that of every [`program`].
+//! The package `gridweave` in [`pipelines/python`](../../pipelines/python/STAGES.md) is the other side: asked by
+//! `python -m gridweave.describe MODULE`, it prints the ports and parameters of the stage, and `python -m
+//! gridweave.program MODULE FOLDER` is its program. The protocol between the two is that of every [`program`].
 
 mod describe;
 
@@ -18,8 +18,8 @@ use std::sync::{Mutex, PoisonError};
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 struct PythonParameters {
-    /// Module with the stage: a file beside the pipeline file, or else in the current folder, such as `lines.py`; or a module
-    /// that Python can import such as `my_stages.lines`; followed by `:NAME` if it has several stages.
+    /// Module with the stage: a file beside the pipeline file, or else in the current folder, such as `lines.py`; or a
+    /// module that Python can import such as `my_stages.lines`; followed by `:NAME` if it has several stages.
     module: String,
     /// Ports and parameters of the module, in JSON. By default the module is asked for them.
     interface: Option<String>,
@@ -30,8 +30,8 @@ impl Parameters for PythonParameters {}
 /// Names of the parameters of every stage in Python.
 const OWN: [&str; 2] = ["module", "interface"];
 
-/// Environment variable with the interpreter, if it is not the `python3` of PATH. A pipeline file cannot set it, as it may be
-/// untrusted.
+/// Environment variable with the interpreter, if it is not the `python3` of PATH. A pipeline file cannot set it, as it
+/// may be untrusted.
 const INTERPRETER: &str = "GRIDWEAVE_PYTHON";
 
 /// The kind `python`, whose ports and parameters are those of its module.

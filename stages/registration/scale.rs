@@ -10,8 +10,8 @@ use super::{PreparedPair, RegistrationParameters, register};
 use crate::shared::geometry::{Grid, GridGeometry};
 use rayon::prelude::*;
 
-/// Bounds of the step between the factors that are tried: with fewer the time of large maps is bounded, whose ends then move
-/// by a cell of the wider search.
+/// Bounds of the step between the factors that are tried: with fewer the time of large maps is bounded, whose ends then
+/// move by a cell of the wider search.
 const STEPS: (f64, f64) = (0.025, 0.05);
 /// Probability that one of the scales that are looked at closely stands out by chance.
 const BY_CHANCE: f64 = 0.05;
@@ -38,8 +38,8 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Finds the scale at which two maps agree, from `1 / (1 + range)` to `1 + range`, or else at a half or two. `None` if there is
-    /// no scale other than 1 at which that is more probable than not.
+    /// Finds the scale at which two maps agree, from `1 / (1 + range)` to `1 + range`, or else at a half or two. `None`
+    /// if there is no scale other than 1 at which that is more probable than not.
     pub fn search(a: Grid<'_>, b: Grid<'_>, range: f64, parameters: &RegistrationParameters) -> Option<Self> {
         let rasters = Rasters::new(a, b, 1.0 + range, &parameters.search)?;
         let step = rasters.step();
@@ -84,7 +84,8 @@ impl Scale {
         (is_inside && best.factor.ln().abs() > LEAST_ERROR).then_some(best)
     }
 
-    /// Finds whether two maps agree with map b at half or at twice its size, which is not searched for the factors beside these.
+    /// Finds whether two maps agree with map b at half or at twice its size, which is not searched for the factors
+    /// beside these.
     fn doubled(a: Grid<'_>, b: Grid<'_>, tried: usize, parameters: &RegistrationParameters) -> Option<Self> {
         let least = (DOUBLINGS.len() as f64 / BY_CHANCE).ln();
         let is_significant = |factor: &f64| {
@@ -111,8 +112,8 @@ impl Scale {
         agreement.inlier_length / (NOISE.powi(2) + agreement.residual.powi(2))
     }
 
-    /// Registers the maps with map b larger by a factor. `None` if it is not more probable than not that they agree, where
-    /// one of all factors that were tried may fit by chance.
+    /// Registers the maps with map b larger by a factor. `None` if it is not more probable than not that they agree,
+    /// where one of all factors that were tried may fit by chance.
     fn at(a: Grid<'_>, b: Grid<'_>, factor: f64, tried: usize, parameters: &RegistrationParameters) -> Option<Self> {
         let pair = PreparedPair::new(a, scaled(b, factor), &parameters.search).ok()?;
         let verdict = register(&pair, &UserKnowledge::default(), parameters).ok()??;
@@ -150,8 +151,8 @@ impl<'a> Rasters<'a> {
         Some(Self { a, b, radius, search })
     }
 
-    /// Step between factors of which half moves the ends of the smaller map by half a cell of the search, which are twice
-    /// as wide as those in which poses are scored.
+    /// Step between factors of which half moves the ends of the smaller map by half a cell of the search, which are
+    /// twice as wide as those in which poses are scored.
     fn step(&self) -> f64 {
         (2.0 * self.search.cell / self.radius).clamp(STEPS.0, STEPS.1)
     }

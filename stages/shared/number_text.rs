@@ -3,7 +3,8 @@
 /// The most decimals that a number gets.
 const MOST_DECIMALS: usize = 6;
 
-/// A value and its bound with `decimals`, or as many more as it takes for them to differ: "0.304 m, and 0.300 m are allowed".
+/// A value and its bound with `decimals`, or as many more as it takes for them to differ: "0.304 m, and 0.300 m are
+/// allowed".
 pub fn beside_bound(value: f64, bound: f64, decimals: usize) -> [String; 2] {
     let with = |decimals: usize| [value, bound].map(|number| format!("{number:.decimals$}"));
     let differ = |texts: &[String; 2]| texts[0] != texts[1];

@@ -4,21 +4,21 @@ use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::Time;
 use std::collections::BTreeMap;
 
-/// The longest time by which consecutive stamps of one kind of message lie out of order, seconds: a greater one is a leap of the
-/// clock. Poses are kept for as long.
+/// The longest time by which consecutive stamps of one kind of message lie out of order, seconds: a greater one is a
+/// leap of the clock. Poses are kept for as long.
 const LONGEST_DISORDER: f64 = 10.0;
-/// The longest time for which a program holds messages back, seconds: the stamps of two kinds of messages that are further apart
-/// are of two clocks. Poses that are found when a drive has ended come as late as the drive was long.
+/// The longest time for which a program holds messages back, seconds: the stamps of two kinds of messages that are
+/// further apart are of two clocks. Poses that are found when a drive has ended come as late as the drive was long.
 const LONGEST_DELAY: f64 = 86_400.0;
 /// The fastest clock of a simulation or a replay, in multiples of the clock that the log times are of.
 const FASTEST_CLOCK: f64 = 10.0;
 
 /// Assigns times to a robot's messages by their stamps.
 ///
-/// Usually the time of a message is its stamp. A clock that leaps (a simulation starts again, one message has a stamp of the
-/// future, a stamp is of another clock) goes on here as the log times do. A message without a stamp takes the time that has passed
-/// in the log since the last one with a stamp; before any other, its log time, and the stamps that follow are put on the clock of
-/// the log if they are of another one.
+/// Usually the time of a message is its stamp. A clock that leaps (a simulation starts again, one message has a stamp
+/// of the future, a stamp is of another clock) goes on here as the log times do. A message without a stamp takes the
+/// time that has passed in the log since the last one with a stamp; before any other, its log time, and the stamps that
+/// follow are put on the clock of the log if they are of another one.
 #[derive(Clone, Debug, Default)]
 pub struct RobotClock {
     /// The last message of each kind.

@@ -59,8 +59,8 @@ pub struct DrawnMapSettings {
     pub building_height: f64,
     /// Pieces of furniture a square metre of a room.
     pub clutter: f64,
-    /// Standard deviation of the slow wavering, metres; it is of one piece over about half a metre. Thin and thick walls
-    /// do not waver.
+    /// Standard deviation of the slow wavering, metres; it is of one piece over about half a metre. Thin and thick
+    /// walls do not waver.
     pub waver: f64,
     /// Standard deviation of a wall cell's displacement across the wall, metres. Thin and thick walls have none.
     pub jitter: f64,
@@ -114,8 +114,8 @@ impl DrawnMapSettings {
     }
 }
 
-/// Draws a map of a random building. The same settings and seed give the same map; the same seed gives the same building
-/// at every angle and in every style.
+/// Draws a map of a random building. The same settings and seed give the same map; the same seed gives the same
+/// building at every angle and in every style.
 pub fn draw_map(settings: &DrawnMapSettings, seed: u64) -> SnapshotMap {
     let stream = |stream: u64| {
         let mut random = ChaCha8Rng::seed_from_u64(seed);

@@ -11,8 +11,8 @@ use rand_distr::StandardNormal;
 /// Parameters of the drift.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Drift {
-    /// Standard deviation after one metre of driving: of the heading in radians, and of the distance in metres. It grows
-    /// with the root of the way. A turn of one radian counts as a tenth of a metre.
+    /// Standard deviation after one metre of driving: of the heading in radians, and of the distance in metres. It
+    /// grows with the root of the way. A turn of one radian counts as a tenth of a metre.
     pub(super) deviation: f64,
     /// Driven distance over which an error decays to 37 %, metres; 0 for no correction.
     pub(super) correction_length: f64,

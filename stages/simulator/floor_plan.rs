@@ -27,7 +27,8 @@ pub enum Layout {
     Symmetric,
     /// All rooms are alike, but for the furniture.
     Repeated,
-    /// Rooms as in `random`, with rows of shelves all through them instead of furniture, as in a warehouse or a library.
+    /// Rooms as in `random`, with rows of shelves all through them instead of furniture, as in a warehouse or a
+    /// library.
     Shelves,
 }
 
@@ -83,8 +84,8 @@ struct Row {
 }
 
 impl FloorPlan {
-    /// A random building. The limits of [`SimulatorParameters`](super::SimulatorParameters) leave every room about 1.5 m wide and
-    /// deep, or more.
+    /// A random building. The limits of [`SimulatorParameters`](super::SimulatorParameters) leave every room about 1.5
+    /// m wide and deep, or more.
     pub(super) fn random(size: &BuildingSize, random: &mut impl Rng) -> Self {
         let BuildingSize { width, height, room_depth, corridor_width, .. } = *size;
         let bounds = Rectangle::new(0.0, 0.0, width, height);

@@ -40,8 +40,8 @@ pub(super) fn furnish_room(room: &Room, clutter: f64, random: &mut impl Rng) -> 
     pieces.into_iter().map(|(_, solid)| solid).collect()
 }
 
-/// Rows of shelves along the longer side of a room, with aisles between them, ways across, and a way all round. None in a room
-/// that is too small.
+/// Rows of shelves along the longer side of a room, with aisles between them, ways across, and a way all round. None in
+/// a room that is too small.
 pub(super) fn shelve_room(room: &Room, random: &mut impl Rng) -> Vec<Solid> {
     let (deep, aisle) = (between(random, 0.4, 1.0), between(random, 1.2, 2.2));
     let long = between(random, 3.0, 8.0);

@@ -1,8 +1,9 @@
 //! A lidar that scans in the plane.
 //!
-//! The model: beams are spread evenly over the field of view, a full circle from straight ahead on, or a sector about it. A beam
-//! meets the first solid in its direction; its range has Gaussian noise of constant deviation. A beam that meets nothing within
-//! the lidar's reach, and one in so many at random, returns nothing. The robot does not move during a scan.
+//! The model: beams are spread evenly over the field of view, a full circle from straight ahead on, or a sector about
+//! it. A beam meets the first solid in its direction; its range has Gaussian noise of constant deviation. A beam that
+//! meets nothing within the lidar's reach, and one in so many at random, returns nothing. The robot does not move
+//! during a scan.
 
 use super::ray_caster::RayCaster;
 use crate::shared::geometry::{Point2, Pose2};

@@ -3,11 +3,12 @@
 //! [`simulate`] creates all of it from [`SimulatorParameters`] and a seed, in the order of the files here: a
 //! [`FloorPlan`] with rooms, doors and furniture; a route and a drive for every robot; lidar scans of the true world;
 //! poses with the drift of a SLAM system, and by the odometry of wheels; a growing occupancy grid per robot, in its own
-//! map frame; and range readings of radio tags on the walls. The same parameters and seed give the same simulation, bit by bit, on any
-//! number of threads: every random quantity has its own stream of random numbers.
+//! map frame; and range readings of radio tags on the walls. The same parameters and seed give the same simulation, bit
+//! by bit, on any number of threads: every random quantity has its own stream of random numbers.
 //!
 //! The source `simulator` sends the simulation as the messages of a log: `/robotN/map`, `/robotN/pose`,
-//! `/robotN/tag_ranges` and `/tf`, `/robotN/scan` and `/robotN/odom` where they are asked for; and the [`Truth`] on `/truth`.
+//! `/robotN/tag_ranges` and `/tf`, `/robotN/scan` and `/robotN/odom` where they are asked for; and the [`Truth`] on
+//! `/truth`.
 //!
 //! [`draw_map`] creates a single map of a building with an exactly known direction, without a drive.
 //!

@@ -39,8 +39,8 @@ pub struct SimulatorParameters {
     #[schemars(range(min = 0.0, max = 1.0))]
     pub clutter: f64,
     /// Layout of the rooms: `random`, `symmetric` (a corridor and its rooms look the same after half a turn),
-    /// `repeated` (all rooms are alike), or `shelves` (as `random`, with rows of shelves). Furniture is placed at random in
-    /// all but the last.
+    /// `repeated` (all rooms are alike), or `shelves` (as `random`, with rows of shelves). Furniture is placed at
+    /// random in all but the last.
     pub layout: Layout,
     /// Share of the rooms whose furniture stands elsewhere for each robot.
     #[schemars(range(min = 0.0, max = 1.0))]
@@ -57,8 +57,8 @@ pub struct SimulatorParameters {
     /// Beams of one lidar scan.
     #[schemars(range(min = 1, max = 10000))]
     pub beams: u32,
-    /// The angle about straight ahead over which they are spread, radians, 0.1 to 2 pi: a lidar's full circle, or what a depth
-    /// camera sees.
+    /// The angle about straight ahead over which they are spread, radians, 0.1 to 2 pi: a lidar's full circle, or what
+    /// a depth camera sees.
     #[schemars(range(min = 0.1, max = TAU))]
     pub field_of_view: f64,
     /// The longest range of the lidar, metres. A beam that meets nothing within it returns nothing.
@@ -83,8 +83,8 @@ pub struct SimulatorParameters {
     pub resolution: Vec<f64>,
     /// Whether the scans of the lidars are logged as well.
     pub scans: bool,
-    /// Whether raw odometry of the wheels is logged as well. The errors that follow are as large as in the public logs Intel and
-    /// CSAIL; the systematic ones differ from robot to robot.
+    /// Whether raw odometry of the wheels is logged as well. The errors that follow are as large as in the public logs
+    /// Intel and CSAIL; the systematic ones differ from robot to robot.
     pub odometry: bool,
     /// Standard deviation over robots of the scale of the distance by odometry, as a share.
     #[schemars(range(min = 0.0, max = 0.5))]
@@ -95,8 +95,8 @@ pub struct SimulatorParameters {
     /// Standard deviation over robots of the turn that odometry adds on the way, radians a metre.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub odometry_yaw_drift: f64,
-    /// Standard deviation of the random error of odometry after one metre, of the heading in radians and of the distance in
-    /// metres; it grows with the square root of the distance.
+    /// Standard deviation of the random error of odometry after one metre, of the heading in radians and of the
+    /// distance in metres; it grows with the square root of the distance.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub odometry_noise: f64,
     /// Mean number of times that the wheels slip on 100 metres, each by up to 0.3 m and 0.4 radians.

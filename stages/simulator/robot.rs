@@ -34,8 +34,8 @@ pub struct RobotLog {
     pub true_poses: Vec<Pose2>,
     /// Estimated poses in its map frame, one per tick.
     pub poses: Vec<Pose2>,
-    /// Poses by the odometry of its wheels, in a frame that is its map frame at the start, one per tick; none if odometry is not
-    /// logged.
+    /// Poses by the odometry of its wheels, in a frame that is its map frame at the start, one per tick; none if
+    /// odometry is not logged.
     pub odometry: Vec<Pose2>,
     /// The tags that it has read, with their ticks.
     pub readings: Vec<(usize, TagReading)>,

@@ -17,7 +17,8 @@ pub(super) struct OdometryErrors {
     pub(super) scale: [f64; 2],
     /// Standard deviation over robots of the turn that wheels of unequal size add, radians a metre.
     pub(super) yaw_drift: f64,
-    /// Standard deviation after one metre of what is not systematic, metres and radians; it grows with the root of the way.
+    /// Standard deviation after one metre of what is not systematic, metres and radians; it grows with the root of the
+    /// way.
     pub(super) noise: f64,
     /// Mean number of slips on 100 metres.
     pub(super) slips: f64,

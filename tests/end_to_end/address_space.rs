@@ -1,4 +1,5 @@
-//! Too little address space (`ulimit -v`): a run that cannot keep the limit is refused, and what was there before stays.
+//! Too little address space (`ulimit -v`): a run that cannot keep the limit is refused, and what was there before
+//! stays.
 
 use crate::support::{Ended, LogBuilder, TestMap, gridweave_program, part, simulate, start_program};
 use std::fs;

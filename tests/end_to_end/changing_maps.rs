@@ -1,4 +1,5 @@
-//! Maps that change their shape, their place, their resolution or their direction while they grow, or are sent in parts.
+//! Maps that change their shape, their place, their resolution or their direction while they grow, or are sent in
+//! parts.
 
 use crate::support::{LogBuilder, SMALL_BUILDING, TestMap, gridweave, simulate};
 use gridweave_logs::reader::{LogFile, LogReader};

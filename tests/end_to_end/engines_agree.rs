@@ -19,8 +19,8 @@ const WAYS: [(&str, &str); 7] = [
 /// Those of them that differ the most, for logs that take long.
 pub(crate) const FAR_APART: [(&str, &str); 3] = [("single", "1"), ("threads", "4"), ("processes", "2")];
 
-/// Merges `log` in these ways, and fails the test where the outputs or the summaries differ. How the last of them ended, and its summary as
-/// `summary.json` in the folder.
+/// Merges `log` in these ways, and fails the test where the outputs or the summaries differ. How the last of them
+/// ended, and its summary as `summary.json` in the folder.
 pub(crate) fn assert_same_output(folder: &Path, log: &Path, ways: &[(&str, &str)]) -> (Ended, Value) {
     let mut first: Option<(Vec<u8>, Value, String)> = None;
     let mut last = None;

@@ -1,5 +1,6 @@
-//! Each call on an output that can fail, in turn: writes, seeks, the sync to the disk, and the rename. A library that is loaded before
-//! the C library makes one of them fail. What was there before stays, the command fails, and it names the file and the cause.
+//! Each call on an output that can fail, in turn: writes, seeks, the sync to the disk, and the rename. A library that
+//! is loaded before the C library makes one of them fail. What was there before stays, the command fails, and it names
+//! the file and the cause.
 
 use crate::support::{LogBuilder, TestMap, gridweave_with, part};
 use gridweave_logs::map_file::{self, GridMap};
@@ -23,7 +24,8 @@ fn library(folder: &Path) -> PathBuf {
     library
 }
 
-/// Runs a command again and again, each time with another call on `output` that fails. Returns the number of failures by call.
+/// Runs a command again and again, each time with another call on `output` that fails. Returns the number of failures
+/// by call.
 #[track_caller]
 fn fail_each_call(args: &[&str], output: &str, prepare: impl Fn(&Path)) -> [usize; CALLS.len()] {
     let folder = TempDir::new().unwrap();

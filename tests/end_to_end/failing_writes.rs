@@ -1,8 +1,8 @@
-//! Writes that fail, at each place in turn, and files that cannot be opened: what was there before stays, the command fails, and it
-//! names the cause.
+//! Writes that fail, at each place in turn, and files that cannot be opened: what was there before stays, the command
+//! fails, and it names the cause.
 //!
-//! A limit of the size of files (`ulimit -f`) makes the write fail that crosses it, as on a full disk. It is raised block by block
-//! until all fits.
+//! A limit of the size of files (`ulimit -f`) makes the write fail that crosses it, as on a full disk. It is raised
+//! block by block until all fits.
 
 use crate::support::{Ended, LogBuilder, SMALL_BUILDING, TestMap, gridweave_program, start_program};
 use gridweave_logs::map_file::{self, GridMap};
@@ -19,8 +19,8 @@ fn run_limited(folder: &Path, blocks: usize, args: &[&str]) -> Ended {
     start_program("sh".as_ref(), folder, &args, &[]).wait()
 }
 
-/// Runs a command with each limit until all that it writes fits. Each time before, its `output` says something else, which stays
-/// if the command fails.
+/// Runs a command with each limit until all that it writes fits. Each time before, its `output` says something else,
+/// which stays if the command fails.
 #[track_caller]
 fn fail_at_each_block(folder: &Path, args: &[&str], outputs: &[&str], most: usize) {
     let earlier = b"what was there before";

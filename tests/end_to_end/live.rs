@@ -106,8 +106,8 @@ fn processes_that_are_halted_for_a_moment_go_on_and_nothing_is_lost() {
     }
 }
 
-/// Numbers of a stage that stands still at its first message until its source has sent `sent` messages: those sent to it,
-/// given to it, and dropped.
+/// Numbers of a stage that stands still at its first message until its source has sent `sent` messages: those sent to
+/// it, given to it, and dropped.
 fn standing_stage(overflow: &str, count: u64, sent: u64) -> [u64; 3] {
     let text = TROUBLED.replace("\"wait\"", overflow).replace("pause = 1000\n", "");
     let settings = [&format!("source.count={count}"), "middle.gates=[1]"];

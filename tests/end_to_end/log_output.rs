@@ -1,4 +1,5 @@
-//! Logs that are written: they explain themselves, keep what the input holds beside messages, and may be bags of rosbag2.
+//! Logs that are written: they explain themselves, keep what the input holds beside messages, and may be bags of
+//! rosbag2.
 
 use crate::support::{LogBuilder, SMALL_BUILDING, TestMap, gridweave, simulate};
 use gridweave_logs::reader::{LogFile, LogReader, SupplementKind};

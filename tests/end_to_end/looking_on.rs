@@ -122,7 +122,8 @@ fn what_a_sender_says_that_comes_and_goes_while_a_recorder_stalls_is_counted_as_
     let output = done.output();
     let sent = output[POSES].len() + output["/robot2/pose"].len();
     let counted = number_before(" messages of 1 links") + number_before(" messages were missed");
-    // Messages that the owner of the link has not read when the sender leaves are lost with the sender, and cannot be counted.
+    // Messages that the owner of the link has not read when the sender leaves are lost with the sender, and cannot be
+    // counted.
     assert!((sent - OWNERS_BUFFER..=sent).contains(&counted), "{counted} of {sent}");
 }
 

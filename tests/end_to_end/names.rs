@@ -1,4 +1,5 @@
-//! Topics and frames as robots log them, without the robots' names: what a merge writes is one tree of frames all the same.
+//! Topics and frames as robots log them, without the robots' names: what a merge writes is one tree of frames all the
+//! same.
 
 use crate::support::{Ended, gridweave, simulate};
 use gridweave_logs::dynamic::Schema;
@@ -134,8 +135,8 @@ impl Convention<'_> {
     }
 }
 
-/// Every frame has one parent over the whole log, on the topics where programs look for transforms; and what every message
-/// names hangs under `world`.
+/// Every frame has one parent over the whole log, on the topics where programs look for transforms; and what every
+/// message names hangs under `world`.
 #[track_caller]
 fn assert_is_one_tree(log: &Path, robots: [&str; 2]) {
     let mut reader = LogReader::new(vec![LogFile::open(log).unwrap()]);

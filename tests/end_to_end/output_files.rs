@@ -1,4 +1,5 @@
-//! Outputs: a run owns the files that it writes, touches no others, and what was there stays until there is something better.
+//! Outputs: a run owns the files that it writes, touches no others, and what was there stays until there is something
+//! better.
 
 use crate::support::{DIAMOND, Run, Running, TROUBLED, gridweave, outcome, part, processes, signal, start, wait_until};
 use std::fs;

@@ -1,5 +1,5 @@
-//! Stages as processes: the same result as in one thread, and a failure that is reported, closed and cleaned up, whatever
-//! dies and however.
+//! Stages as processes: the same result as in one thread, and a failure that is reported, closed and cleaned up,
+//! whatever dies and however.
 
 use crate::support::{
     DIAMOND, Ended, Running, gridweave_program, left_over, outcome, part, processes, read, signal, start,
@@ -250,7 +250,8 @@ fn the_result_is_that_of_one_thread_however_stages_stall_and_are_placed() {
 
 #[test]
 fn a_full_disk_leaves_a_log_that_says_so() {
-    // A small file system is more than a test may ask for; a limit of the size of files is not, where there is no other file.
+    // A small file system is more than a test may ask for; a limit of the size of files is not, where there is no other
+    // file.
     let folder = folder();
     let limited = "trap '' XFSZ; ulimit -f 40; exec \"$0\" \"$@\"";
     let program = gridweave_program().to_str().unwrap();

@@ -1,5 +1,5 @@
-//! The libraries for Python that people read logs with (`mcap`, `mcap-ros2-support`, `rosbags`) read every message that is
-//! written.
+//! The libraries for Python that people read logs with (`mcap`, `mcap-ros2-support`, `rosbags`) read every message that
+//! is written.
 
 use crate::support::{SMALL_BUILDING, gridweave, simulate};
 use gridweave_logs::reader::{LogFile, LogReader};

@@ -70,8 +70,8 @@ fn robots_with_scans_alone_are_merged() {
     merge(folder).assert(0, &["maps are built from scans", "merged 2 of 2"]);
 }
 
-/// Writes a log again with odometry in place of poses, which finds every way 3 % too long, and with lidars that are mounted
-/// askew, which tf says if `is_mounted`. The odometry is in tf alone if `in_tf`.
+/// Writes a log again with odometry in place of poses, which finds every way 3 % too long, and with lidars that are
+/// mounted askew, which tf says if `is_mounted`. The odometry is in tf alone if `in_tf`.
 fn with_odometry(log: &Path, to: &Path, in_tf: bool, is_mounted: bool) {
     const ASKEW: f64 = 0.3;
     let bytes = std::fs::read(log).unwrap();

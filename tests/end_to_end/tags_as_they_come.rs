@@ -1,5 +1,5 @@
-//! Tags as robots log them: ranges in messages of other types, signal strengths, tags that a camera sees, and logs of tags
-//! without maps.
+//! Tags as robots log them: ranges in messages of other types, signal strengths, tags that a camera sees, and logs of
+//! tags without maps.
 
 use crate::support::{Ended, LogBuilder, gridweave, simulate};
 use gridweave_logs::reader::{LogFile, LogReader};
@@ -30,8 +30,8 @@ impl World {
         Self { folder, log, truth }
     }
 
-    /// Writes the log again as `in.mcap`, without maps unless `maps`, and with `write` in place of the readings of tags: it is
-    /// given the time in seconds, the robot, its last pose, and the reading.
+    /// Writes the log again as `in.mcap`, without maps unless `maps`, and with `write` in place of the readings of
+    /// tags: it is given the time in seconds, the robot, its last pose, and the reading.
     fn write(&self, maps: bool, mut write: impl FnMut(&mut LogBuilder, f64, &str, Isometry2<f64>, TagRange)) {
         let mut out = LogBuilder::new(&self.folder.path().join("in.mcap"));
         let mut reader = LogReader::new(vec![LogFile::open(&self.log).unwrap()]);
@@ -126,7 +126,8 @@ fn a_log_of_tags_without_maps_gives_frames_and_no_map() {
 #[test]
 fn fields_of_any_message_are_ranges_or_signal_strengths_of_tags() {
     let world = World::new();
-    // The range in millimetres, and then the strength of a signal without noise, in a message of another type and topic.
+    // The range in millimetres, and then the strength of a signal without noise, in a message of another type and
+    // topic.
     let models: [(&str, &dyn Fn(f64) -> f64); 2] = [
         ("range_field = \"range\", range_unit = 0.001, stddev = 0.05", &|metres| 1000.0 * metres),
         ("rssi_field = \"range\", rssi_at_1m = -40, path_loss_exponent = 2.5, rssi_stddev = 0.5", &|metres| {

@@ -41,8 +41,8 @@ impl Kept {
         Self { name: name.into(), moved: None }
     }
 
-    /// The reading of the tag by this name and at its place, by a robot at `position`; it keeps its noise. None if it is out
-    /// of reach there.
+    /// The reading of the tag by this name and at its place, by a robot at `position`; it keeps its noise. None if it
+    /// is out of reach there.
     fn reading(&self, mut reading: TagRange, position: &Point2<f64>) -> Option<TagRange> {
         reading.tag_id.clone_from(&self.name);
         if let Some([from, to]) = &self.moved {

@@ -69,8 +69,8 @@ fn grid_of(map: &GridMap) -> Result<Grid<'_>> {
     Ok(Grid::new(GridGeometry::from(&map.info), &map.cells)?)
 }
 
-/// The walls of map a in grey, its edges and those of map b where they lie on it: paler those that are for no place or for
-/// another.
+/// The walls of map a in grey, its edges and those of map b where they lie on it: paler those that are for no place or
+/// for another.
 fn draw(grid_a: &Grid<'_>, edges: [&[Edge]; 2], pairs: &[[usize; 2]], transform_a_b: &Pose2) -> Drawing {
     let lines: [Vec<Vec<Point2>>; 2] = [0, 1].map(|map| {
         let place = |point: Point2| if map == 0 { point } else { transform_a_b * point };

@@ -2,8 +2,8 @@
 //!
 //!     cargo run --release -p gridweave-tests --bin experiments -- align --help
 //!
-//! Each experiment is a file or a folder here. It prints its tables and writes them as CSV, and its curves as SVG, to a folder.
-//! Everything but the times is the same on every machine: an experiment's trials are seeded one by one.
+//! Each experiment is a file or a folder here. It prints its tables and writes them as CSV, and its curves as SVG, to a
+//! folder. Everything but the times is the same on every machine: an experiment's trials are seeded one by one.
 
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 

@@ -2,8 +2,9 @@
 //!
 //! Two robots explore one simulated building; one property of the world at a time is varied, all others keep the
 //! simulator's defaults. A merge is right below 0.5 m and 1 degree, wrong above, and refused if the robots were not
-//! merged. That is measured against where the robots' map frames are. Where poses drift, maps are bent, and another rigid frame
-//! aligns the places that both have driven through better: the error against the best such frame is reported as well.
+//! merged. That is measured against where the robots' map frames are. Where poses drift, maps are bent, and another
+//! rigid frame aligns the places that both have driven through better: the error against the best such frame is
+//! reported as well.
 
 use super::plot::{Axis, Plot, Series, Shape};
 use super::results::Results;
@@ -273,8 +274,8 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
     results.plot(&name, &plot)
 }
 
-/// Whether places that both robots have driven through are farther apart by the rigid frames than they must be: by half a metre in
-/// the median, or by a metre at 90 %.
+/// Whether places that both robots have driven through are farther apart by the rigid frames than they must be: by half
+/// a metre in the median, or by a metre at 90 %.
 fn is_wrong_by_places(common: &CommonPlaces) -> bool {
     let best = common.from_best.map(|best| best.best);
     let beyond = |found: f64, best: Option<f64>, most: f64| found >= most + best.unwrap_or_default();

@@ -291,8 +291,8 @@ impl Plot {
     }
 }
 
-/// The corner of the plot that holds fewest of the points, which are shares of its width and height; of several the first
-/// here.
+/// The corner of the plot that holds fewest of the points, which are shares of its width and height; of several the
+/// first here.
 fn emptiest_corner(points: &[(f64, f64)]) -> SeriesLabelPosition {
     let corners = [
         (SeriesLabelPosition::UpperRight, 0.75, 0.75),

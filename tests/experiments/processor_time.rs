@@ -1,4 +1,5 @@
-//! The time that a thread has computed, which other work on the machine does not lengthen as it does the time on a clock.
+//! The time that a thread has computed, which other work on the machine does not lengthen as it does the time on a
+//! clock.
 
 use rustix::time::{ClockId, clock_gettime};
 use std::time::Duration;

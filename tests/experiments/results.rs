@@ -19,7 +19,8 @@ impl Results {
         Ok(Self { folder: folder.to_owned(), written: Vec::new() })
     }
 
-    /// Prints a table under a title, on a terminal as wide as that and as Markdown elsewhere, and writes it as NAME.csv.
+    /// Prints a table under a title, on a terminal as wide as that and as Markdown elsewhere, and writes it as
+    /// NAME.csv.
     pub(super) fn table(&mut self, name: &str, title: &str, table: &Table) -> Result<()> {
         println!("{title}\n\n{}", table.to_terminal().unwrap_or_else(|| table.to_markdown()));
         self.data(name, table)

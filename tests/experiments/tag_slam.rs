@@ -1,9 +1,9 @@
-//! Robots without maps whose odometry drifts, merged by the tags that they read: how exact their frames are, and whether their
-//! covariances are true.
+//! Robots without maps whose odometry drifts, merged by the tags that they read: how exact their frames are, and
+//! whether their covariances are true.
 //!
-//! Two robots drive round a place twice, and read its tags by one sense. The drift of the heading is varied. A frame is right below
-//! 0.5 m and 1 degree; what is off by more may still be within its covariance, as the heading of the first pose can be known no better
-//! than the drift allows.
+//! Two robots drive round a place twice, and read its tags by one sense. The drift of the heading is varied. A frame is
+//! right below 0.5 m and 1 degree; what is off by more may still be within its covariance, as the heading of the first
+//! pose can be known no better than the drift allows.
 
 use super::results::Results;
 use super::statistics::{median, quantile};
@@ -31,7 +31,8 @@ pub(super) struct TagSlamArgs {
 
 /// Drifts of the heading after a metre, radians.
 const DRIFTS: [f64; 5] = [0.0, 0.003, 0.01, 0.03, 0.1];
-/// With a correct covariance, 95 % of the squared errors in x, y and yaw are below this (chi-squared with three degrees of freedom).
+/// With a correct covariance, 95 % of the squared errors in x, y and yaw are below this (chi-squared with three degrees
+/// of freedom).
 const NORMALISED_95: f64 = 7.815;
 
 /// A place with tags, and how they are read.

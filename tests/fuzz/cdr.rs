@@ -110,8 +110,8 @@ fn schemas() -> &'static BTreeMap<String, Schema> {
     })
 }
 
-/// What can be decoded can be encoded, and the other decoder reads that. (Of a text without the zero byte at its end one
-/// decoder drops the last letter and the other does not, so it is not asked whether both read `bytes` alike.)
+/// What can be decoded can be encoded, and the other decoder reads that. (Of a text without the zero byte at its end
+/// one decoder drops the last letter and the other does not, so it is not asked whether both read `bytes` alike.)
 fn read_as<'a, T: RosMessage + Serialize + Deserialize<'a>>(bytes: &'a [u8]) {
     let schema = &schemas()[T::NAME];
     let _ = schema.decode(bytes).map(|value| value.to_json(JsonOptions { longest_array: Some(16) }));

@@ -9,7 +9,8 @@ use std::path::Path;
 
 const FILE: &str = "bag_0.db3";
 
-/// A database with a few rows, of which some continue on other pages; small pages, so that a change is likely to matter.
+/// A database with a few rows, of which some continue on other pages; small pages, so that a change is likely to
+/// matter.
 fn database(more: &str) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(FILE);

@@ -1,5 +1,5 @@
-//! Whatever bytes come in, a reader gives what they say or an error: it does not panic, does not hang, and takes no memory
-//! that the bytes do not warrant.
+//! Whatever bytes come in, a reader gives what they say or an error: it does not panic, does not hang, and takes no
+//! memory that the bytes do not warrant.
 //!
 //! Each target begins with what real encoders write and changes it in a few places; now and then its input is random.
 //! Inputs follow from a seed, so that a run can be repeated, and are few enough for every test run. A long search:

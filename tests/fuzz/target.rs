@@ -29,8 +29,8 @@ static TURN: Mutex<()> = Mutex::new(());
 /// How many inputs were answered.
 static ANSWERED: AtomicU64 = AtomicU64::new(0);
 
-/// Ends this program if a reader hangs, until what it gives is dropped. A thread cannot be ended, and what it reads must
-/// stay as it is.
+/// Ends this program if a reader hangs, until what it gives is dropped. A thread cannot be ended, and what it reads
+/// must stay as it is.
 fn watch(name: &'static str, folder: PathBuf) -> Sender<()> {
     let (done, end) = mpsc::channel();
     thread::spawn(move || {

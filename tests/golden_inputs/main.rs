@@ -1,5 +1,5 @@
-//! Writes the inputs of the golden cases, `KIND/CASE/input.mcap` in `tests/golden`, and in the crate of the published methods those
-//! of its stages:
+//! Writes the inputs of the golden cases, `KIND/CASE/input.mcap` in `tests/golden`, and in the crate of the published
+//! methods those of its stages:
 //!
 //!     cargo run -p gridweave-tests --bin golden_inputs             # those that are made up
 //!     cargo run -p gridweave-tests --bin golden_inputs -- --cuts   # and those that are cut out of a simulated log

@@ -3,8 +3,8 @@
 //!     cargo run --release -p gridweave-tests --bin torture -- rounds --rounds 1000 --kills --seed 1
 //!     cargo run --release -p gridweave-tests --bin torture -- soak --minutes 60 --seed 1
 //!
-//! Where the machine allows it, everything runs in separate namespaces with their own processes and /dev/shm, which end with
-//! it, and some runs in further ones, as in containers that share /tmp and /dev/shm.
+//! Where the machine allows it, everything runs in separate namespaces with their own processes and /dev/shm, which end
+//! with it, and some runs in further ones, as in containers that share /tmp and /dev/shm.
 
 mod fault;
 mod processes;
@@ -40,8 +40,8 @@ enum Args {
         /// Duration in minutes.
         #[arg(long, default_value_t = 60.0)]
         minutes: f64,
-        /// Rate relative to the recording: no faster than the machine can follow, as the run must have no pending work half a
-        /// minute after the last message.
+        /// Rate relative to the recording: no faster than the machine can follow, as the run must have no pending work
+        /// half a minute after the last message.
         #[arg(long, default_value_t = 2.0)]
         rate: f64,
         /// Seed of the kills and their times.

@@ -27,7 +27,8 @@ impl Outcome<'_> {
 
     fn check_file(&self, fault: Fault, ended: &Ended) -> Result<()> {
         ensure!(!ended.text.contains("panicked"), "it panicked");
-        // A supervisor that was ended by a signal reports no status. One that comes before the program can handle it ends it at once.
+        // A supervisor that was ended by a signal reports no status. One that comes before the program can handle it
+        // ends it at once.
         let has_begun = part(self.path).exists() || !self.was_there && self.path.exists();
         let may_end = fault.may_leave() || fault == Fault::KillStage || matches!(fault, Fault::Signal(_)) && !has_begun;
         ensure!(ended.status.is_some() || may_end, "it ended by a signal");

@@ -205,8 +205,8 @@ impl Round {
     }
 }
 
-/// Removes what runs have left. A process that was just being started when the others were killed is one that lives, until it
-/// finds itself alone.
+/// Removes what runs have left. A process that was just being started when the others were killed is one that lives,
+/// until it finds itself alone.
 fn clean(world: &mut World) -> Result<()> {
     let start = Instant::now();
     loop {

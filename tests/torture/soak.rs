@@ -1,4 +1,5 @@
-//! A soak: a log is played into a live pipeline over and over while stages are killed, and nothing grows or goes missing.
+//! A soak: a log is played into a live pipeline over and over while stages are killed, and nothing grows or goes
+//! missing.
 
 use crate::processes::{Started, stages, wait_for, with_text};
 use crate::world::{World, print_line};

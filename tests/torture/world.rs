@@ -21,7 +21,8 @@ pub(crate) fn print_line(text: &str) {
     writeln!(std::io::stderr(), "{text}").ok();
 }
 
-/// Runs this program in separate namespaces, and returns its exit code. `None` if it is in them already, or they are not allowed.
+/// Runs this program in separate namespaces, and returns its exit code. `None` if it is in them already, or they are
+/// not allowed.
 pub(crate) fn isolate() -> Result<Option<ExitCode>> {
     if std::env::var_os(INSIDE).is_some() {
         return Ok(None);

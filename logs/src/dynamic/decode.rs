@@ -8,8 +8,8 @@ use super::value::{Array, Scalar, Value};
 /// The maximum number of bytes after the last field: encoders pad the length.
 const PADDING: usize = 3;
 
-/// The maximum number of values in a decoded message. A value takes up to a hundred bytes, and a few packed bytes of a log can
-/// expand to a message of a gigabyte.
+/// The maximum number of values in a decoded message. A value takes up to a hundred bytes, and a few packed bytes of a
+/// log can expand to a message of a gigabyte.
 const MOST_VALUES: usize = 1 << 21;
 
 /// The error when a message cannot be decoded.

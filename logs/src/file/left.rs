@@ -1,7 +1,7 @@
 //! Whole files that are left as parts, until those of all stages of a run take their names together.
 //!
-//! The process that has written a part keeps it locked until then. Where the stages are processes, it is unlocked from the end of its
-//! process to the end of the run.
+//! The process that has written a part keeps it locked until then. Where the stages are processes, it is unlocked from
+//! the end of its process to the end of the run.
 
 use super::{OutputFile, WriteError};
 use std::io::{self, Write};

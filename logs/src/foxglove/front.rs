@@ -1,8 +1,8 @@
 //! The front of the Foxglove server: it lets in a limited number of clients, and no pages of foreign sites.
 //!
-//! A browser lets any page open a WebSocket to this machine, so a server that does not check the site of the page shows the run to
-//! each page that the user visits. The server of the Foxglove SDK checks nothing; so it listens on an address of this machine that a
-//! page cannot guess, and clients are relayed to it once they have been checked.
+//! A browser lets any page open a WebSocket to this machine, so a server that does not check the site of the page shows
+//! the run to each page that the user visits. The server of the Foxglove SDK checks nothing; so it listens on an
+//! address of this machine that a page cannot guess, and clients are relayed to it once they have been checked.
 
 use crate::browsers::{BrowserServer, Connection};
 use std::io;
@@ -49,8 +49,8 @@ fn let_in(mut client: Connection, inner: SocketAddr, sites: &[String]) -> io::Re
     }
 }
 
-/// Whether a page of a site may connect to this machine at `own`: one of this machine, of the app, or of the listed `sites`; or an
-/// app that is no page of a site.
+/// Whether a page of a site may connect to this machine at `own`: one of this machine, of the app, or of the listed
+/// `sites`; or an app that is no page of a site.
 fn is_trusted(origin: &str, own: IpAddr, sites: &[String]) -> bool {
     if sites.iter().any(|site| site.trim_end_matches('/').eq_ignore_ascii_case(origin)) {
         return true;

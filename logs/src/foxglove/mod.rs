@@ -39,7 +39,8 @@ struct FoxgloveParameters {
     /// The maximum number of queued messages per client; beyond it the oldest are dropped.
     #[schemars(range(min = 1, max = 100_000))]
     backlog: usize,
-    /// The sites whose pages may connect, such as `https://viewer.example`, beside those of this machine and of Foxglove.
+    /// The sites whose pages may connect, such as `https://viewer.example`, beside those of this machine and of
+    /// Foxglove.
     origins: Vec<String>,
 }
 

@@ -70,8 +70,8 @@ pub fn image_of(yaml: &Path) -> Result<PathBuf, MapFileError> {
     Ok(describe(yaml)?.0.image)
 }
 
-/// The content of the YAML file, with the image's path relative to the working directory; and the path in the file if that
-/// image is missing and another one is used.
+/// The content of the YAML file, with the image's path relative to the working directory; and the path in the file if
+/// that image is missing and another one is used.
 fn describe(yaml: &Path) -> Result<(Description, Option<PathBuf>), MapFileError> {
     let text = input_file::read_text(yaml).map_err(|source| MapFileError::Read { path: yaml.to_owned(), source })?;
     let description = Description::parse(&text, yaml)?;
@@ -83,8 +83,8 @@ fn describe(yaml: &Path) -> Result<(Description, Option<PathBuf>), MapFileError>
     Ok((Description { image, ..description }, missing))
 }
 
-/// The image beside the YAML file, if the one in the file cannot be reached: with the same name, as in a file that was copied
-/// from another machine with its image, or with the name of the YAML file.
+/// The image beside the YAML file, if the one in the file cannot be reached: with the same name, as in a file that was
+/// copied from another machine with its image, or with the name of the YAML file.
 fn image_beside_yaml(named: &Path, yaml: &Path) -> Option<PathBuf> {
     // It may be missing, or in a folder of another user, or below what is no folder here.
     if std::fs::metadata(named).is_ok() {
@@ -99,7 +99,8 @@ fn image_beside_yaml(named: &Path, yaml: &Path) -> Option<PathBuf> {
     images.iter().find(|image| image.is_file()).cloned().or_else(|| in_other_case(&images))
 }
 
-/// The first of some images in one folder that is there under a name in other case: Windows and macOS take both for one.
+/// The first of some images in one folder that is there under a name in other case: Windows and macOS take both for
+/// one.
 fn in_other_case(images: &[PathBuf]) -> Option<PathBuf> {
     let lower_case = |path: &Path| path.file_name().and_then(|name| name.to_str()).map(str::to_lowercase);
     let entries = std::fs::read_dir(folder_of(images.first()?)).ok()?;
@@ -113,7 +114,8 @@ fn in_other_case(images: &[PathBuf]) -> Option<PathBuf> {
     images.iter().find_map(found)
 }
 
-/// What a file is that is no image of a supported format, by its first bytes, and what would mend it; `None` if it may be one.
+/// What a file is that is no image of a supported format, by its first bytes, and what would mend it; `None` if it may
+/// be one.
 fn unreadable_type(bytes: &[u8]) -> Option<String> {
     const SUPPORTED: &str = "PGM, PPM, PBM, PNG, BMP and JPEG are read: convert it to one of these, such as PNG";
     let formats: [(&[u8], &str); 5] = [

@@ -141,8 +141,8 @@ impl Reading {
     }
 }
 
-/// The numbers of pixels in shades that are no occupancy in the mode `raw`, which writes 255 for unknown, and of those that are;
-/// `None` where the latter are as many.
+/// The numbers of pixels in shades that are no occupancy in the mode `raw`, which writes 255 for unknown, and of those
+/// that are; `None` where the latter are as many.
 fn shaded_as_others(greys: &[u64; 256]) -> Option<(u64, u64)> {
     let (occupancies, shades) = (greys[..=100].iter().sum(), greys[101..255].iter().sum());
     (shades > occupancies).then_some((shades, occupancies))

@@ -15,8 +15,8 @@ use std::path::PathBuf;
 struct MapFileSinkParameters {
     /// The YAML file to write; the image has the same name with the extension pgm. Existing files are replaced.
     file: PathBuf,
-    /// Whether the file is left as `FILE.part` when it is whole: the command renames the files of all stages together. Set by the
-    /// command.
+    /// Whether the file is left as `FILE.part` when it is whole: the command renames the files of all stages together.
+    /// Set by the command.
     leave_part: bool,
 }
 

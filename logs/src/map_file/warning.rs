@@ -14,7 +14,8 @@ pub struct MapFileWarning {
     pub walls: Option<(f64, f64)>,
     /// The number of transparent cells, which are unknown.
     pub transparent: Option<u64>,
-    /// The numbers of pixels in shades that are no occupancy in the mode `raw`, and of others, where most are of the former.
+    /// The numbers of pixels in shades that are no occupancy in the mode `raw`, and of others, where most are of the
+    /// former.
     pub shaded: Option<(u64, u64)>,
     /// The numbers of occupied and of free cells, where there are more occupied ones: the image may be inverted.
     pub inverted: Option<(u64, u64)>,

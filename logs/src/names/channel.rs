@@ -24,7 +24,8 @@ enum Frames {
     /// Unchanged, or there are none.
     AsLogged,
     /// Put under a robot (unchanged if empty), with stamps shifted `later` by nanoseconds. With `is_map`, an empty
-    /// frame name is the map frame. Frames that have the name `logged_as` of the robot in the log get the other instead.
+    /// frame name is the map frame. Frames that have the name `logged_as` of the robot in the log get the other
+    /// instead.
     OfRobot { robot: String, logged_as: Option<String>, is_map: bool, later: i64, recoder: Recoder },
     /// Unchanged, because the definition of the messages cannot be used, for this reason.
     Unknown(String),

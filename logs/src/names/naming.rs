@@ -142,8 +142,8 @@ fn put_under_robots(drafts: &mut [Draft], robot_of_file: &[Option<String>], rule
     }
 }
 
-/// Transforms of all robots share a topic. Two others with one name would be taken for one: of two maps, each would replace
-/// the other.
+/// Transforms of all robots share a topic. Two others with one name would be taken for one: of two maps, each would
+/// replace the other.
 fn check_renamed(drafts: &[Draft]) -> Result<(), NameError> {
     let mut first: BTreeMap<&str, &Draft> = BTreeMap::new();
     for draft in drafts.iter().filter(|draft| tf_topic(&draft.channel).is_none()) {
@@ -156,7 +156,8 @@ fn check_renamed(drafts: &[Draft]) -> Result<(), NameError> {
     Ok(())
 }
 
-/// The maps of two robots would be taken for those of one if both have one name. The logs of one robot follow each other.
+/// The maps of two robots would be taken for those of one if both have one name. The logs of one robot follow each
+/// other.
 fn check_robots(
     drafts: &[Draft],
     roles: &RobotChannels,

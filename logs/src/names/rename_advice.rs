@@ -9,11 +9,11 @@ const ROBOT: &str = "{robot}";
 /// Parts of topics that say where on a robot a sensor is.
 const PLACES: [&str; 8] = ["front", "rear", "back", "left", "right", "top", "upper", "lower"];
 
-/// The options `--rename` that put the maps on `topics` under the names of their robots, where `pattern` is the topic that maps
-/// are expected on. Empty if two topics fit at least, or if the topics do not show which robots there are.
+/// The options `--rename` that put the maps on `topics` under the names of their robots, where `pattern` is the topic
+/// that maps are expected on. Empty if two topics fit at least, or if the topics do not show which robots there are.
 ///
-/// Topics that differ in one part are those of several robots: `/fleet/{robot}/map`. Topics of one part, such as `/map1`,
-/// `/b_map` or `/map` beside `/robot2/map`, are renamed one by one.
+/// Topics that differ in one part are those of several robots: `/fleet/{robot}/map`. Topics of one part, such as
+/// `/map1`, `/b_map` or `/map` beside `/robot2/map`, are renamed one by one.
 pub fn rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -> Vec<String> {
     let (fitting, others): (BTreeSet<&str>, BTreeSet<&str>) =
         topics.partition(|topic| match_robot(pattern, topic).is_some());
@@ -48,8 +48,8 @@ pub fn rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -
     advice
 }
 
-/// The option `--rename` that puts the scans on `topics` under the names of their robots, where `pattern` is the topic that scans are
-/// expected on; `None` if a topic fits, or if the topics do not show which robots there are.
+/// The option `--rename` that puts the scans on `topics` under the names of their robots, where `pattern` is the topic
+/// that scans are expected on; `None` if a topic fits, or if the topics do not show which robots there are.
 pub fn scan_rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -> Option<String> {
     let topics: BTreeSet<&str> = topics.collect();
     if topics.iter().any(|topic| match_robot(pattern, topic).is_some()) {
@@ -85,8 +85,8 @@ fn common_template(topics: &[&str], what: &str) -> Option<String> {
     best.map(|(template, _)| template)
 }
 
-/// The name of the robot whose map is on a topic of one part: what is left of it without the word `map`; `robot1` and so on where
-/// nothing is left.
+/// The name of the robot whose map is on a topic of one part: what is left of it without the word `map`; `robot1` and
+/// so on where nothing is left.
 fn robot_of_part(topic: &str, taken: &BTreeSet<String>) -> Option<String> {
     let part = topic.strip_prefix('/')?;
     let is_separator = |letter: char| letter == '_' || letter == '-';

@@ -1,7 +1,7 @@
 //! Frames without a robot's name in the transforms of all robots.
 //!
-//! Maps get the names of their robots before their frames: `map` becomes `robot1/map`. Transforms on `/tf` belong to all
-//! robots, so it is their frames that show which of them follow: those from `map` to `robot1/base_link` become
+//! Maps get the names of their robots before their frames: `map` becomes `robot1/map`. Transforms on `/tf` belong to
+//! all robots, so it is their frames that show which of them follow: those from `map` to `robot1/base_link` become
 //! transforms from `robot1/map`, also where the maps of several robots are in the one frame `map`.
 
 use super::Names;

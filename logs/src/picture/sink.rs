@@ -17,8 +17,8 @@ use std::path::{Path, PathBuf};
 struct PictureParameters {
     /// The file to write: PNG, SVG or PDF by its extension. An existing file is replaced.
     file: PathBuf,
-    /// Whether the file is left as `FILE.part` when it is whole: the command renames the files of all stages together. Set by the
-    /// command.
+    /// Whether the file is left as `FILE.part` when it is whole: the command renames the files of all stages together.
+    /// Set by the command.
     leave_part: bool,
 }
 

@@ -87,8 +87,8 @@ impl Block {
         matches!(&self.records, Records::Chunk(chunk) if chunk.cut)
     }
 
-    /// Loads the block's messages, into the memory of a released block. `definitions` are those of its file. Individually
-    /// compressed messages take at most `room` bytes.
+    /// Loads the block's messages, into the memory of a released block. `definitions` are those of its file.
+    /// Individually compressed messages take at most `room` bytes.
     pub(crate) fn load(
         &self,
         storage: &Storage,

@@ -12,8 +12,8 @@ use std::io::{self, Read, Write};
 /// The magic bytes of a zstd frame. CDR messages start with a zero.
 pub(crate) const ZSTD_MAGIC: &[u8] = b"\x28\xb5\x2f\xfd";
 
-/// Copies the messages in `records`, with individually compressed ones decompressed, to at most `most` bytes. A message that
-/// cannot be decompressed is unchanged.
+/// Copies the messages in `records`, with individually compressed ones decompressed, to at most `most` bytes. A message
+/// that cannot be decompressed is unchanged.
 pub(crate) fn decompress_messages(records: &[u8], definitions: &Definitions, most: u64) -> Result<Vec<u8>, ChunkFault> {
     let mut decompressed = Vec::new();
     let mut position = 0;

@@ -6,8 +6,8 @@ use serde::Serialize;
 /// exhaust memory. A few bytes of a file can claim, and even decompress to, any size.
 pub(crate) const LARGEST: u64 = 1 << 30;
 
-/// The maximum size of the blocks that overlap in time, and so are in memory together, bytes; one block is always allowed.
-/// Recorders close a chunk after 1 to 16 MB.
+/// The maximum size of the blocks that overlap in time, and so are in memory together, bytes; one block is always
+/// allowed. Recorders close a chunk after 1 to 16 MB.
 pub(crate) const LARGEST_OVERLAP: u64 = 1 << 30;
 
 /// The maximum number of reports of the same damage: a few packed bytes can expand to millions of damaged records.

@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 /// The maximum number of channels in a log: their numbers have 16 bits, and 0 and 65535 are reserved.
 pub(crate) const MOST_CHANNELS: usize = 65534;
 
-/// The maximum size of the descriptions of all channels of a log, bytes. Each channel counts with its schema, also if they share
-/// one: readers keep a parsed copy for each.
+/// The maximum size of the descriptions of all channels of a log, bytes. Each channel counts with its schema, also if
+/// they share one: readers keep a parsed copy for each.
 const MOST_BYTES: usize = 64 << 20;
 
 /// The channels and schemas of one file, by number.
@@ -74,8 +74,8 @@ impl Definitions {
         }
     }
 
-    /// Removes the channels with the greatest numbers if the descriptions of all are too large together. Returns the number
-    /// of those that it has removed.
+    /// Removes the channels with the greatest numbers if the descriptions of all are too large together. Returns the
+    /// number of those that it has removed.
     pub(crate) fn limit(&mut self) -> usize {
         let (before, mut left, schemas) = (self.channels.len(), MOST_BYTES, &self.schemas);
         self.channels.retain(|_, channel| {

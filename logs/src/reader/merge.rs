@@ -126,8 +126,9 @@ impl LogReader {
         self.prefetcher.sample(count);
     }
 
-    /// Limits reading to the blocks with messages of the channels that `part` selects, each given by the index of its file and its
-    /// number in it; of a file without an index, to its beginning. Must be called before the first message is read.
+    /// Limits reading to the blocks with messages of the channels that `part` selects, each given by the index of its
+    /// file and its number in it; of a file without an index, to its beginning. Must be called before the first message
+    /// is read.
     pub(crate) fn limit_to(&mut self, part: impl Fn(usize, u16) -> Option<ChannelPart>) {
         let mut blocks = BTreeSet::new();
         for (file, log) in self.files.iter().enumerate() {

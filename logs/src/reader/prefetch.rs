@@ -111,7 +111,8 @@ impl Prefetcher {
         self.start_all();
         let Started { id, size, load } = self.started.pop_front()?;
         self.started_bytes -= size;
-        // Whether a block has room does not depend on how many were prefetched, which depends on the number of processors.
+        // Whether a block has room does not depend on how many were prefetched, which depends on the number of
+        // processors.
         let load = match load {
             Loading::Thread(thread) => match thread.join().unwrap_or(Err(ChunkFault::Records)) {
                 // A thread panics only on a block that cannot be read.

@@ -1,5 +1,5 @@
-//! Conventions in which programs write the cells of an occupancy grid, and their translation to that of ROS map servers: -1
-//! unknown, 0 free to 100 occupied.
+//! Conventions in which programs write the cells of an occupancy grid, and their translation to that of ROS map
+//! servers: -1 unknown, 0 free to 100 occupied.
 
 mod bytes;
 mod costmap;
@@ -16,7 +16,8 @@ use std::fmt;
 const INSCRIBED: i8 = 99;
 /// The value of an obstacle, in costmaps and in maps.
 const LETHAL: i8 = 100;
-/// Two classes of values explain more of their variance than this: as much as they explain of values that are spread evenly.
+/// Two classes of values explain more of their variance than this: as much as they explain of values that are spread
+/// evenly.
 const EVEN_SPREAD: f64 = 0.75;
 /// The least difference of the means of two classes of values, if they are not 0 and one other value.
 const LEAST_CONTRAST: f64 = 20.0;
@@ -25,16 +26,18 @@ const LEAST_CONTRAST: f64 = 20.0;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CellValues {
-    /// By the distribution of the values in each map: as `occupancy` where some cells are occupied and some free; as `costmap`
-    /// where obstacles are inflated; else as `two_classes` where the values fall into two classes. Values outside -1 to 100 are read
-    /// as those of an image or of a costmap from 0 to 255, where they fit, and else as unknown.
+    /// By the distribution of the values in each map: as `occupancy` where some cells are occupied and some free; as
+    /// `costmap` where obstacles are inflated; else as `two_classes` where the values fall into two classes. Values
+    /// outside -1 to 100 are read as those of an image or of a costmap from 0 to 255, where they fit, and else as
+    /// unknown.
     #[default]
     Auto,
     /// As map servers write them: occupied from 65 to 100, free below 25.
     Occupancy,
     /// As nav2's costmaps: 100 is an obstacle, and costs that fall with the distance from it are free space.
     Costmap,
-    /// The larger of two classes of values is occupied and the smaller free, whatever they are: 0 and 1, 30 and 70, 25 and 100.
+    /// The larger of two classes of values is occupied and the smaller free, whatever they are: 0 and 1, 30 and 70, 25
+    /// and 100.
     TwoClasses,
 }
 
@@ -62,7 +65,8 @@ impl fmt::Display for Convention {
 }
 
 impl CellValues {
-    /// The cells of a map in the convention of map servers, and the convention that they were in. Borrowed if they are in it.
+    /// The cells of a map in the convention of map servers, and the convention that they were in. Borrowed if they are
+    /// in it.
     pub(crate) fn read<'a>(self, info: &MapMetaData, cells: &'a [i8]) -> (Cow<'a, [i8]>, Convention) {
         let convention = self.convention(info.width as usize, cells);
         let read = match convention {
@@ -79,7 +83,8 @@ impl CellValues {
         (read, convention)
     }
 
-    /// A map message in the convention of map servers, and what its values were read as; `None` if it is in it, or is no map.
+    /// A map message in the convention of map servers, and what its values were read as; `None` if it is in it, or is
+    /// no map.
     pub(crate) fn translate(self, message: &[u8]) -> Option<(Vec<u8>, Vec<String>)> {
         let map: OccupancyGrid<'_> = decode(message).ok()?;
         let cells = map.cells();
@@ -111,7 +116,8 @@ impl CellValues {
                 let counts = Counts::of(cells);
                 let has = |is: fn(i8) -> bool| (0..=LETHAL).any(|value| is(value) && counts.of_value(value) > 0);
                 match has(cell::is_occupied) && has(cell::is_free) {
-                    // Of a costmap as many cells are inscribed as are obstacles; the walk over its cells is left to such maps.
+                    // Of a costmap as many cells are inscribed as are obstacles; the walk over its cells is left to
+                    // such maps.
                     true if counts.of_value(INSCRIBED) >= counts.of_value(LETHAL).max(1)
                         && obstacles_are_inflated(width, cells) =>
                     {
@@ -141,8 +147,9 @@ impl Counts {
         usize::try_from(value).ok().and_then(|index| self.0.get(index)).copied().unwrap_or(0)
     }
 
-    /// The means of the two classes into which the values fall, the larger of which has fewer cells as walls have; `None` if
-    /// they are one class. The classes are those of Otsu, "A threshold selection method from gray-level histograms" (1979).
+    /// The means of the two classes into which the values fall, the larger of which has fewer cells as walls have;
+    /// `None` if they are one class. The classes are those of Otsu, "A threshold selection method from gray-level
+    /// histograms" (1979).
     fn two_classes(&self) -> Option<(f64, f64)> {
         let total = self.0.iter().sum::<u64>() as f64;
         let values = || self.0.iter().enumerate().map(|(value, count)| (value as f64, *count as f64));

@@ -236,7 +236,8 @@ impl RobotChannels {
         self.topics.tf.is_some() || self.sees_tags() || with_frames.iter().any(|robots| !robots.is_empty())
     }
 
-    /// Classifies a channel. One whose names do not fit in the header of a message is no robot's: the others go on without it.
+    /// Classifies a channel. One whose names do not fit in the header of a message is no robot's: the others go on
+    /// without it.
     pub(crate) fn classify<'a>(&self, channel: &'a Channel) -> Classified<'a> {
         let classified = self.classify_by_type(channel);
         let name_fits = fits(classified.robot);

@@ -1,4 +1,5 @@
-//! Poses of robots without a pose topic: from tf, or from odometry in the map frame, or in any where a robot has no map.
+//! Poses of robots without a pose topic: from tf, or from odometry in the map frame, or in any where a robot has no
+//! map.
 
 use super::channels::RobotChannels;
 use super::mounts::BASES;

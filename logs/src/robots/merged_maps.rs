@@ -21,8 +21,8 @@ pub(crate) enum MapOrigin {
     Undecided,
 }
 
-/// Distinguishes merged maps from those of robots. A map is a merged one if its frame is the parent of the map frames of two other
-/// robots, or if it is the world's and two others have maps in frames of their own.
+/// Distinguishes merged maps from those of robots. A map is a merged one if its frame is the parent of the map frames
+/// of two other robots, or if it is the world's and two others have maps in frames of their own.
 #[derive(Debug, Default)]
 pub(crate) struct MergedMaps {
     /// The robots whose maps were seen, and whether they are in frames of their own.
@@ -43,8 +43,8 @@ impl MergedMaps {
         }
     }
 
-    /// Records a map in `frame`, which by its topic is of `robot`, and finds out whose it is. `mapped` are all robots with topics
-    /// of maps.
+    /// Records a map in `frame`, which by its topic is of `robot`, and finds out whose it is. `mapped` are all robots
+    /// with topics of maps.
     pub(crate) fn origin<'a>(
         &mut self,
         robot: &str,

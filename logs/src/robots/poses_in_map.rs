@@ -54,7 +54,8 @@ impl PosesInMap {
         }
     }
 
-    /// An encoded pose, transformed to the frame of the robot's map; `None` if it is in it, or if tf does not connect the two.
+    /// An encoded pose, transformed to the frame of the robot's map; `None` if it is in it, or if tf does not connect
+    /// the two.
     pub(crate) fn in_map(&self, robot: &str, pose: &[u8]) -> Option<Vec<u8>> {
         let map = self.map_frames.get(robot)?.as_ref()?;
         let Header { frame_id, .. } = decode(pose).ok()?;

@@ -42,8 +42,8 @@ impl Scans {
         self.set.contains_key(robot) || self.mounts.mount(robot, frame).is_ok()
     }
 
-    /// Transforms a scan to the base frame, in the plane. The angles of a lidar mounted upside down run clockwise. A lidar
-    /// whose [mount is unknown](Self::knows_mount) is taken to be the base.
+    /// Transforms a scan to the base frame, in the plane. The angles of a lidar mounted upside down run clockwise. A
+    /// lidar whose [mount is unknown](Self::knows_mount) is taken to be the base.
     pub(crate) fn to_base_frame(&self, robot: &str, scan: LaserScan) -> RangeScan {
         let frame = || scan.header.frame_id.clone();
         let (base, transform_base_lidar) = match self.set.get(robot) {

@@ -3,7 +3,8 @@
 use gridweave_runtime::ros::{Header, MapMetaData, Quaternion, decode};
 use serde::Deserialize;
 
-/// A map is said to be tilted from this angle on, degrees: a smaller one changes no cell by more than thousandths of its place.
+/// A map is said to be tilted from this angle on, degrees: a smaller one changes no cell by more than thousandths of
+/// its place.
 const LEAST_TILT: f64 = 1.0;
 
 /// The beginning of a map, up to its cells.
@@ -14,8 +15,8 @@ struct MapStart {
     info: MapMetaData,
 }
 
-/// What is wrong with the rotation of a map's origin, of which only the yaw is used; `None` if it is in the plane, or if the
-/// message is no map.
+/// What is wrong with the rotation of a map's origin, of which only the yaw is used; `None` if it is in the plane, or
+/// if the message is no map.
 pub(crate) fn tilt_of(map: &[u8]) -> Option<String> {
     let Quaternion { x, y, z, w } = decode::<MapStart>(map).ok()?.info.origin.orientation;
     let squares = [x, y, z, w].map(|value| value * value);

@@ -1,4 +1,5 @@
-//! Map frames that the run places in the world: transforms of the input must not give them another parent, nor one to the world.
+//! Map frames that the run places in the world: transforms of the input must not give them another parent, nor one to
+//! the world.
 
 use crate::tf::MAP_FRAMES;
 use gridweave_runtime::message::Channel;
@@ -48,8 +49,8 @@ impl GivenFrames {
         logged
     }
 
-    /// Learns the frames in a message of transforms from the run. Returns those to which the input has given another parent,
-    /// once, with both parents.
+    /// Learns the frames in a message of transforms from the run. Returns those to which the input has given another
+    /// parent, once, with both parents.
     pub(crate) fn learn(&mut self, transforms: &[u8]) -> Vec<TwoParents> {
         let Ok(message) = decode::<TFMessage>(transforms) else { return Vec::new() };
         let mut conflicts = Vec::new();
@@ -64,8 +65,8 @@ impl GivenFrames {
         conflicts
     }
 
-    /// A message of input transforms without those that place such a frame or the world, and why each of those is left out;
-    /// `None` if there are none. The message is empty if no transform is left.
+    /// A message of input transforms without those that place such a frame or the world, and why each of those is left
+    /// out; `None` if there are none. The message is empty if no transform is left.
     pub(crate) fn without(&mut self, transforms: &[u8]) -> Option<(Vec<u8>, Vec<&'static str>)> {
         if self.patterns.is_empty() {
             return None;

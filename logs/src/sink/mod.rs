@@ -1,5 +1,5 @@
-//! The stage kind `mcap_sink`: writes all input messages to a log (MCAP, profile `ros2`; or, if its name ends in `.bag`, a
-//! ROS 1 bag).
+//! The stage kind `mcap_sink`: writes all input messages to a log (MCAP, profile `ros2`; or, if its name ends in
+//! `.bag`, a ROS 1 bag).
 //!
 //! The log contains the results, each on the topic of its output, and by default the messages of the input on the
 //! channels that they were logged on. The same messages give the same bytes: the log does not contain when or where it
@@ -59,8 +59,8 @@ pub enum Compression {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SinkParameters {
-    /// The log to write; one whose name ends in `.bag` is a ROS 1 bag. An existing file of that name is replaced. Set by
-    /// `--output`.
+    /// The log to write; one whose name ends in `.bag` is a ROS 1 bag. An existing file of that name is replaced. Set
+    /// by `--output`.
     pub file: PathBuf,
     /// Whether the content of the input logs is written beside the results: messages, attachments and metadata records.
     pub pass_input: bool,
@@ -75,8 +75,8 @@ pub struct SinkParameters {
     pub recorded_pipeline: String,
     /// The input files whose names, sizes and hashes are recorded in the log. Set by the command.
     pub recorded_files: Vec<PathBuf>,
-    /// Whether the file is left as `FILE.part` when it is whole: the command renames the files of all stages together. Set by the
-    /// command.
+    /// Whether the file is left as `FILE.part` when it is whole: the command renames the files of all stages together.
+    /// Set by the command.
     pub leave_part: bool,
 }
 

@@ -87,7 +87,8 @@ impl OutputLog {
     }
 }
 
-/// Closes the bag that a killed writer has left, of which the whole records end at `end`; it has no index. Returns its path.
+/// Closes the bag that a killed writer has left, of which the whole records end at `end`; it has no index. Returns its
+/// path.
 pub(super) fn close_bag(output: OutputFile, end: Option<u64>) -> Result<PathBuf, LogWriteError> {
     if let Some(end) = end {
         output.file().set_len(end).map_err(|error| LogWriteError::from_io(output.part(), error))?;

@@ -170,8 +170,8 @@ impl ChannelRouter {
         self.derived.send_of_learnt(route, data, output)
     }
 
-    /// Sends a message on the port of its role: unchanged, but for maps whose cells have values of another convention. A map
-    /// whose origin is undecided is held.
+    /// Sends a message on the port of its role: unchanged, but for maps whose cells have values of another convention.
+    /// A map whose origin is undecided is held.
     fn pass(
         &mut self,
         index: usize,
@@ -254,8 +254,8 @@ impl ChannelRouter {
         undecided.iter().try_for_each(|(index, stamp, data)| self.pass_map(*index, *stamp, data, may_hold, output))
     }
 
-    /// Returns the index of a channel's route, and adds the route if there is none. `None`, with a warning, if the topic's
-    /// name is too long.
+    /// Returns the index of a channel's route, and adds the route if there is none. `None`, with a warning, if the
+    /// topic's name is too long.
     pub(super) fn add(&mut self, channel: Channel, output: &Output<RobotMessages>) -> Option<usize> {
         if let Some(&index) = self.by_channel.get(&channel) {
             return Some(index);

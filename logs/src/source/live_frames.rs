@@ -5,12 +5,13 @@ use gridweave_runtime::ros::{Header, TFMessage, decode};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
-/// So many static messages are kept, and so many edges are known: more than programs of robots have, and a bound for others.
+/// So many static messages are kept, and so many edges are known: more than programs of robots have, and a bound for
+/// others.
 const MAX_STATIC: usize = 256;
 const MAX_EDGES: usize = 4096;
 
-/// What is known of the frames in transforms of all robots. A log shows all of its maps and transforms from the start; live they come
-/// one by one.
+/// What is known of the frames in transforms of all robots. A log shows all of its maps and transforms from the start;
+/// live they come one by one.
 #[derive(Debug, Default)]
 pub(super) struct LiveFrames {
     /// The frame of the last map of each robot.

@@ -50,12 +50,12 @@ pub struct SourceParameters {
     pub align_start: bool,
     /// Whether the thresholds of map files among the logs are applied literally; see `map_file_source`.
     pub literal_thresholds: bool,
-    /// How the values of maps' cells are read: by the distribution of the values in each map (`auto`), as map servers write them
-    /// (`occupancy`), as costmaps with costs around obstacles (`costmap`), or as two classes whatever their values
-    /// (`two_classes`). Maps of another convention are sent as map servers write them.
+    /// How the values of maps' cells are read: by the distribution of the values in each map (`auto`), as map servers
+    /// write them (`occupancy`), as costmaps with costs around obstacles (`costmap`), or as two classes whatever their
+    /// values (`two_classes`). Maps of another convention are sent as map servers write them.
     pub map_values: CellValues,
-    /// The poses of lidars on the bases of their robots, as `{ ROBOT = [X, Y, YAW] }`, metres and radians, in place of those
-    /// in tf. A fourth number is the roll: pi for a lidar that is mounted upside down.
+    /// The poses of lidars on the bases of their robots, as `{ ROBOT = [X, Y, YAW] }`, metres and radians, in place of
+    /// those in tf. A fourth number is the roll: pi for a lidar that is mounted upside down.
     pub lidars: LidarPoses,
     /// Start, in seconds after the first message of the logs. The latest map of each robot before that, and other
     /// latched messages, are sent at the start.

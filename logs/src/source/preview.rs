@@ -1,8 +1,9 @@
-//! What holds from the beginning of a log, though it is logged later: where sensors are mounted, and the frames of maps.
+//! What holds from the beginning of a log, though it is logged later: where sensors are mounted, and the frames of
+//! maps.
 //!
-//! A program that joins a live robot receives the static transforms and the last map before anything else. A recorder writes
-//! them when they come: a driver that starts after its robot, or a map that is first published after a minute, would leave what
-//! was recorded before it without a mount or a map frame.
+//! A program that joins a live robot receives the static transforms and the last map before anything else. A recorder
+//! writes them when they come: a driver that starts after its robot, or a map that is first published after a minute,
+//! would leave what was recorded before it without a mount or a map frame.
 
 use super::channel_router::ChannelRouter;
 use crate::names::Names;
@@ -13,7 +14,8 @@ use gridweave_runtime::ros::{Header, TFMessage, decode};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// Teaches `router` the static transforms of the files, the first transforms of others, and the frames of the first maps.
+/// Teaches `router` the static transforms of the files, the first transforms of others, and the frames of the first
+/// maps.
 pub(super) fn learn_ahead(files: &Arc<[LogFile]>, names: &Names, router: &mut ChannelRouter) {
     let needs_frames = router.needs_frames();
     // Whoever writes transforms needs the frames of the maps.

@@ -35,8 +35,8 @@ pub(crate) struct Router {
 }
 
 impl Router {
-    /// Creates a router for the messages of `files`. If `updates_maps`, whole maps are derived from map updates, and frames that
-    /// are logged late are read ahead.
+    /// Creates a router for the messages of `files`. If `updates_maps`, whole maps are derived from map updates, and
+    /// frames that are logged late are read ahead.
     pub(crate) fn new(
         robots: RobotTopics,
         names: Names,

@@ -6,21 +6,22 @@ use std::collections::VecDeque;
 /// The maximum number of remembered senders.
 const MAX_SENDERS: usize = 64;
 
-/// The senders that have disconnected without an end. The receiver keeps a limited number of their states, including their last
-/// maps, for their reconnection.
+/// The senders that have disconnected without an end. The receiver keeps a limited number of their states, including
+/// their last maps, for their reconnection.
 #[derive(Debug, Default)]
 pub(super) struct AbsentSenders(VecDeque<Presence>);
 
 impl AbsentSenders {
-    /// Adds a disconnected sender. Returns the session to be forgotten if there are too many: the one disconnected longest.
+    /// Adds a disconnected sender. Returns the session to be forgotten if there are too many: the one disconnected
+    /// longest.
     pub(super) fn add(&mut self, sender: Presence) -> Option<u64> {
         self.0.push_back(sender);
         let oldest = if self.0.len() > MAX_SENDERS { self.0.pop_front() } else { None };
         oldest.map(|oldest| oldest.number)
     }
 
-    /// Removes a connected sender. Returns the sessions to be forgotten: older ones of the same name, which a restarted sender
-    /// replaces.
+    /// Removes a connected sender. Returns the sessions to be forgotten: older ones of the same name, which a restarted
+    /// sender replaces.
     pub(super) fn remove(&mut self, sender: &Presence) -> Vec<u64> {
         self.0.retain(|absent| absent != sender);
         let replaced = self.0.iter().filter(|absent| absent.name == sender.name).map(|absent| absent.number).collect();

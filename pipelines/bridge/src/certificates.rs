@@ -48,7 +48,8 @@ impl Certificates {
         }
     }
 
-    /// The settings of Zenoh, as JSON5. With an authority and a certificate each end requires one of the other (mutual TLS).
+    /// The settings of Zenoh, as JSON5. With an authority and a certificate each end requires one of the other (mutual
+    /// TLS).
     ///
     /// # Errors
     /// A file cannot be read, which Zenoh would not report.

@@ -2,7 +2,8 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// The system clock, nanoseconds since the Unix epoch. It is only read where messages come from or go to other programs.
+/// The system clock, nanoseconds since the Unix epoch. It is only read where messages come from or go to other
+/// programs.
 pub fn nanoseconds_now() -> i64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
@@ -22,10 +23,10 @@ impl Clock {
     }
 }
 
-/// The clock offset of the receiver, nanoseconds, as in the Network Time Protocol (RFC 5905, section 8): from the times at which
-/// the sender sent the request and received the answer, by its clock, and at which the receiver received and answered it, by the
-/// receiver's clock. Its error is at most half of the round-trip time; it is 0 if the clocks may agree within this error, as a
-/// packet that is sent again takes seconds one way and none the other.
+/// The clock offset of the receiver, nanoseconds, as in the Network Time Protocol (RFC 5905, section 8): from the times
+/// at which the sender sent the request and received the answer, by its clock, and at which the receiver received and
+/// answered it, by the receiver's clock. Its error is at most half of the round-trip time; it is 0 if the clocks may
+/// agree within this error, as a packet that is sent again takes seconds one way and none the other.
 pub(super) fn offset(sent: i64, came: i64, answered: i64, received: i64) -> i64 {
     let there = i128::from(came) - i128::from(sent);
     let back = i128::from(answered) - i128::from(received);

@@ -1,7 +1,7 @@
 //! Explanations of failed connections, with what would fix them.
 //!
-//! Zenoh retries connections without reporting the reason. The connecting end finds it with [`connection_error`]; the listening
-//! end from Zenoh's log, whose warnings a program passes to [`on_log_warning`].
+//! Zenoh retries connections without reporting the reason. The connecting end finds it with [`connection_error`]; the
+//! listening end from Zenoh's log, whose warnings a program passes to [`on_log_warning`].
 
 use super::zenoh_session::in_words;
 use std::sync::{Mutex, PoisonError};
@@ -43,8 +43,8 @@ pub(super) fn explained(words: &str) -> String {
     }
 }
 
-/// Tries once to connect to the only endpoint of a configuration. Returns the error; none if it succeeds. Takes up to Zenoh's
-/// timeout, ten seconds by default.
+/// Tries once to connect to the only endpoint of a configuration. Returns the error; none if it succeeds. Takes up to
+/// Zenoh's timeout, ten seconds by default.
 pub(super) fn connection_error(mut config: Config) -> Option<String> {
     // A peer, unlike a client, returns the reason as an error.
     let once = [

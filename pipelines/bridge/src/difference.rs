@@ -1,7 +1,8 @@
 //! The compressed difference of a message to a previous one, for maps, which change little from one to the next.
 //!
-//! It is a Zstandard frame whose dictionary is the previous message, as `zstd --patch-from` makes it. So it works for maps that
-//! grow, shrink and move, and for messages of any type. A checksum verifies that the message is restored byte for byte.
+//! It is a Zstandard frame whose dictionary is the previous message, as `zstd --patch-from` makes it. So it works for
+//! maps that grow, shrink and move, and for messages of any type. A checksum verifies that the message is restored byte
+//! for byte.
 
 use std::io;
 use zstd::zstd_safe::{CCtx, CParameter, DCtx, DParameter, get_error_name, get_frame_content_size};

@@ -1,8 +1,8 @@
 //! The outbox of a sender: messages until the receiver has acknowledged them, independent of the network.
 //!
-//! One batch is in flight at a time: all pending messages, up to a size. It is sent again with the same bytes until it is
-//! answered, so nothing is lost, duplicated or reordered, and on a slow connection batches grow instead of queues. Messages
-//! beyond the limits are dropped and counted.
+//! One batch is in flight at a time: all pending messages, up to a size. It is sent again with the same bytes until it
+//! is answered, so nothing is lost, duplicated or reordered, and on a slow connection batches grow instead of queues.
+//! Messages beyond the limits are dropped and counted.
 
 use super::difference::difference;
 use super::wire::{Answer, Batch, Entry, Form, Link, Outcome, to_bytes};
@@ -167,8 +167,8 @@ impl Outbox {
         self.put(key, entry, bytes, is_state)
     }
 
-    /// Drops the oldest message of a full topic. States are sent as differences to the previous one, so all pending ones are
-    /// dropped, and the next one is sent as a whole.
+    /// Drops the oldest message of a full topic. States are sent as differences to the previous one, so all pending
+    /// ones are dropped, and the next one is sent as a whole.
     fn drop_oldest(&mut self, key: &(u32, String), is_state: bool, most: usize) {
         let Some(topic) = self.topics.get_mut(key).filter(|topic| topic.waiting.len() >= most) else { return };
         let dropped: Vec<u64> = topic.waiting.drain(..if is_state { topic.waiting.len() } else { 1 }).collect();
@@ -329,8 +329,8 @@ impl Outbox {
         }
     }
 
-    /// Restarts with a handshake for another receiver, followed by the pending entries, those in flight, and the last message of
-    /// each topic.
+    /// Restarts with a handshake for another receiver, followed by the pending entries, those in flight, and the last
+    /// message of each topic.
     ///
     /// # Errors
     /// There is not enough memory.

@@ -1,7 +1,7 @@
 //! Discovery: the liveliness tokens of the two ends of a bridge, and of programs that tap links of a sender's run.
 //!
-//! The key of a token is `gridweave/bridge/BRIDGE/ROLE/NAME/NUMBER`. Zenoh withdraws it when the program ends, and when the
-//! connection was silent for ten seconds.
+//! The key of a token is `gridweave/bridge/BRIDGE/ROLE/NAME/NUMBER`. Zenoh withdraws it when the program ends, and when
+//! the connection was silent for ten seconds.
 
 use super::zenoh_session::in_words;
 use gridweave_runtime::stage::StageError;

@@ -293,7 +293,8 @@ impl Worker {
         }
     }
 
-    /// Reports that there is no receiver, with the reason if known. Runs in a separate thread, as finding the reason takes long.
+    /// Reports that there is no receiver, with the reason if known. Runs in a separate thread, as finding the reason
+    /// takes long.
     fn report_absence(&self) {
         let (network, shared) = (self.settings.network.clone(), Arc::clone(&self.shared));
         let is_connected = is_connected(&self.session);
@@ -319,7 +320,8 @@ impl Worker {
         }
     }
 
-    /// Sends a batch and waits for the answer; none if there is no answer. Returns it with the clock offset of the receiver.
+    /// Sends a batch and waits for the answer; none if there is no answer. Returns it with the clock offset of the
+    /// receiver.
     fn send_batch(&self, receiver: &Presence, batch: Vec<u8>) -> Result<Option<(Answer, i64)>, String> {
         let key = receiver.key(&self.settings.network.bridge, Role::Receiver);
         let sent = self.settings.clock.nanoseconds();

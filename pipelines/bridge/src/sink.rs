@@ -27,18 +27,18 @@ pub struct SinkParameters {
     pub bridge: String,
     /// The name of this end; the default is the name of the machine.
     pub sender: Option<String>,
-    /// The robot as which messages about no particular robot are sent, for example by a base that sends its merged map to another
-    /// base. Their topics and map frames get its name.
+    /// The robot as which messages about no particular robot are sent, for example by a base that sends its merged map
+    /// to another base. Their topics and map frames get its name.
     pub robot: Option<String>,
-    /// The receivers and routers of Zenoh to connect to, as `tcp/HOST:PORT` or `tls/HOST:PORT`. The connection is retried until it
-    /// succeeds.
+    /// The receivers and routers of Zenoh to connect to, as `tcp/HOST:PORT` or `tls/HOST:PORT`. The connection is
+    /// retried until it succeeds.
     pub connect: Vec<String>,
     /// The addresses where others may connect, as `tcp/HOST:PORT` or `tls/HOST:PORT`.
     pub listen: Vec<String>,
     /// Search for the other end on the local network, by multicast.
     pub discover: bool,
-    /// The authority (PEM) that must have signed the certificate of the other end, for `tls/HOST:PORT`; the default is the public
-    /// authorities of browsers.
+    /// The authority (PEM) that must have signed the certificate of the other end, for `tls/HOST:PORT`; the default is
+    /// the public authorities of browsers.
     pub authority: Option<PathBuf>,
     /// The certificate (PEM) of this end, for receivers that require one.
     pub certificate: Option<PathBuf>,
@@ -51,13 +51,15 @@ pub struct SinkParameters {
     /// The maximum number of pending messages of a topic; beyond it the oldest is dropped.
     #[schemars(range(min = 1))]
     pub keep_last: usize,
-    /// The maximum number of pending messages of a topic with states, such as maps; beyond it all of them are replaced by the next.
+    /// The maximum number of pending messages of a topic with states, such as maps; beyond it all of them are replaced
+    /// by the next.
     #[schemars(range(min = 1))]
     pub keep_maps: usize,
     /// The minimum time from one batch of messages to the next, seconds.
     #[schemars(range(min = 0.0, max = 60.0))]
     pub interval: f64,
-    /// The period at which the progress of the stages is reported to the other end, for its `top`, seconds; 0 for never.
+    /// The period at which the progress of the stages is reported to the other end, for its `top`, seconds; 0 for
+    /// never.
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub report_stages: f64,
     /// Allow the other end to tap the links of this run, including those that are not sent, with `tap` on the base.

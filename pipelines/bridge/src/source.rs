@@ -40,15 +40,15 @@ pub struct SourceParameters {
     pub bridge: String,
     /// The name of this end.
     pub receiver: String,
-    /// The senders and routers of Zenoh to connect to, as `tcp/HOST:PORT` or `tls/HOST:PORT`. The connection is retried until it
-    /// succeeds.
+    /// The senders and routers of Zenoh to connect to, as `tcp/HOST:PORT` or `tls/HOST:PORT`. The connection is retried
+    /// until it succeeds.
     pub connect: Vec<String>,
     /// The addresses where others may connect, as `tcp/HOST:PORT` or `tls/HOST:PORT`.
     pub listen: Vec<String>,
     /// Let the other ends find this one on the local network, by multicast.
     pub discover: bool,
-    /// The authority (PEM) that must have signed the certificates of all ends that connect to `tls/HOST:PORT`. Without it no
-    /// certificate is required of them.
+    /// The authority (PEM) that must have signed the certificates of all ends that connect to `tls/HOST:PORT`. Without
+    /// it no certificate is required of them.
     pub authority: Option<PathBuf>,
     /// The certificate (PEM) of this end, for `tls/HOST:PORT`, with the names by which others connect to it.
     pub certificate: Option<PathBuf>,

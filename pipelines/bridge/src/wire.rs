@@ -1,4 +1,5 @@
-//! The messages between the two ends of a bridge: the version of the protocol, followed by CDR, compressed with Zstandard.
+//! The messages between the two ends of a bridge: the version of the protocol, followed by CDR, compressed with
+//! Zstandard.
 
 use super::difference;
 use gridweave_runtime::message::{FixedText, LogTime, MessageHeader};

@@ -14,7 +14,8 @@ pub fn join(config: Result<Config, String>) -> Result<Session, StageError> {
     zenoh::open(config).wait().map_err(|cause| StageError::new(doing, in_words(&cause)))
 }
 
-/// The configuration of a peer that connects to some endpoints and listens at others, with further settings of Zenoh as JSON5.
+/// The configuration of a peer that connects to some endpoints and listens at others, with further settings of Zenoh as
+/// JSON5.
 ///
 /// # Errors
 /// Zenoh rejects a setting.

@@ -8,8 +8,8 @@ use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
-/// The cells of a map (rows x columns, row 0 at the origin), its resolution (metres), and the pose of the outer corner of cell (0, 0):
-/// x, y (metres), yaw (radians).
+/// The cells of a map (rows x columns, row 0 at the origin), its resolution (metres), and the pose of the outer corner
+/// of cell (0, 0): x, y (metres), yaw (radians).
 pub(crate) type Grid<'py> = (Bound<'py, PyArray2<i8>>, f64, (f64, f64, f64));
 
 /// The map of an array.

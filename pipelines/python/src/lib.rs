@@ -1,7 +1,8 @@
 //! The native part of the Python package `gridweave`: what its Python files cannot do themselves.
 //!
-//! Arrays come in and go out as numpy arrays, everything else as plain Python values and JSON; the Python files give them names and
-//! types. The interpreter is not held while a pipeline runs, and an interrupt of the user ends the run in order.
+//! Arrays come in and go out as numpy arrays, everything else as plain Python values and JSON; the Python files give
+//! them names and types. The interpreter is not held while a pipeline runs, and an interrupt of the user ends the run
+//! in order.
 
 #![forbid(unsafe_code)]
 
@@ -31,7 +32,8 @@ mod _native {
     #[pymodule_export]
     use super::requests::{Request, merge_files, merge_maps, run_pipeline};
 
-    /// Runs the command `gridweave` with arguments, and returns its exit status. `program` is the command line that starts it again.
+    /// Runs the command `gridweave` with arguments, and returns its exit status. `program` is the command line that
+    /// starts it again.
     #[pyfunction]
     fn command(py: Python<'_>, program: Vec<String>, arguments: Vec<OsString>) -> u8 {
         if let Some((python, arguments)) = program.split_first() {

@@ -8,7 +8,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::path::PathBuf;
 
-/// The messages of logs in log time order: topic, type, encoding, definition, log time and publish time (nanoseconds), and bytes.
+/// The messages of logs in log time order: topic, type, encoding, definition, log time and publish time (nanoseconds),
+/// and bytes.
 #[pyclass(unsendable)]
 pub(crate) struct LogMessages {
     reader: LogReader,

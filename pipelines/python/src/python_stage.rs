@@ -1,8 +1,9 @@
 //! Stages that are Python objects of this interpreter.
 //!
-//! The object has the methods `start(request)`, `receive(port, robot, log_time, topic, wire, data)`, `advance()`, `finish()` and
-//! `abort(reason)`, as the program of a stage in a process has them: `gridweave/in_process.py`. Each returns what the stage sends
-//! meanwhile: a list of (output, robot, log time, bytes), a list of warnings, and whether a source has ended.
+//! The object has the methods `start(request)`, `receive(port, robot, log_time, topic, wire, data)`, `advance()`,
+//! `finish()` and `abort(reason)`, as the program of a stage in a process has them: `gridweave/in_process.py`. Each
+//! returns what the stage sends meanwhile: a list of (output, robot, log time, bytes), a list of warnings, and whether
+//! a source has ended.
 
 use crate::errors::RequestError;
 use gridweave_runtime::message::{LogTime, Message};
@@ -36,7 +37,8 @@ impl Outputs for Ports {
 /// What a call of the object returns.
 type Sent = (Vec<(usize, String, u64, Vec<u8>)>, Vec<String>, bool);
 
-/// The kind of stage `name` with the ports and parameters of `interface`, of which `make` makes an object. It is never freed.
+/// The kind of stage `name` with the ports and parameters of `interface`, of which `make` makes an object. It is never
+/// freed.
 pub(crate) fn kind(name: String, interface: &str, make: Py<PyAny>) -> PyResult<StageKind> {
     let wrong = |problem| RequestError::new_err(format!("the stage `{name}` is wrong: {problem}"));
     let Interface { summary, inputs, outputs, parameters, definitions, .. } =

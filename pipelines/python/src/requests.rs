@@ -69,7 +69,8 @@ pub(crate) fn merge_maps<'py>(
     answer(py, merged)
 }
 
-/// Runs a pipeline on files, with stages in this interpreter: the name of each kind, its interface as JSON, and a function that makes one.
+/// Runs a pipeline on files, with stages in this interpreter: the name of each kind, its interface as JSON, and a
+/// function that makes one.
 #[pyfunction]
 pub(crate) fn run_pipeline<'py>(
     py: Python<'py>,

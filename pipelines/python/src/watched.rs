@@ -29,8 +29,9 @@ impl Observer for Watch {
     }
 }
 
-/// Does work in a thread of its own, without the interpreter, and calls `progress` with the share that is done, 0 to 1. An exception
-/// of a signal handler, such as that of an interrupt, or of `progress` stops the work, and is raised when it has ended.
+/// Does work in a thread of its own, without the interpreter, and calls `progress` with the share that is done, 0 to 1.
+/// An exception of a signal handler, such as that of an interrupt, or of `progress` stops the work, and is raised when
+/// it has ended.
 pub(crate) fn watched<T: Send>(
     py: Python<'_>,
     progress: Option<Bound<'_, PyAny>>,

@@ -1,13 +1,13 @@
-//! A fleet of simulated robots, each with a bridge to a base that merges their maps: how much goes over the network, how long it
-//! takes from a robot's map to the merged map, what the base needs, and what it drops.
+//! A fleet of simulated robots, each with a bridge to a base that merges their maps: how much goes over the network,
+//! how long it takes from a robot's map to the merged map, what the base needs, and what it drops.
 //!
 //!     cargo run --release --example fleet -- measure 4,8,16,32,64 fleet.csv
 //!     cargo run --release --example fleet -- floors 16 floors.csv      # two bases, and one above that merges theirs
 //!     cargo run --release --example fleet -- plot fleet.csv fleet.svg
 //!
-//! Each robot sends a pose ten times a second and a map every five seconds for a minute. Everything runs on one machine: give
-//! the robots, which are threads here, less of it with `nice`. Any other arguments are those of the command `gridweave-ros`,
-//! which this program is, too, for the bases that it starts.
+//! Each robot sends a pose ten times a second and a map every five seconds for a minute. Everything runs on one
+//! machine: give the robots, which are threads here, less of it with `nice`. Any other arguments are those of the
+//! command `gridweave-ros`, which this program is, too, for the bases that it starts.
 
 use anyhow::{Context as _, Result, bail};
 use gridweave_runtime::message::{FixedText, LogTime, Message, MessageFlags, MessageHeader};
@@ -114,7 +114,8 @@ struct Base {
 }
 
 impl Base {
-    /// Merges what comes to the port `listen`, and sends the merged map to the port `to`, as the map of the robot `name`.
+    /// Merges what comes to the port `listen`, and sends the merged map to the port `to`, as the map of the robot
+    /// `name`.
     fn start(folder: &Path, name: &str, listen: u16, to: u16) -> Result<Self> {
         let text = include_str!("../../bridge/bridge_base.toml");
         let text = text.replace("tcp/localhost:7448", &format!("tcp/127.0.0.1:{listen}"));
@@ -135,8 +136,8 @@ impl Base {
         Ok(Self { child, name: name.to_owned(), log: path })
     }
 
-    /// What its stages take: memory in bytes, how many of them work at a time (or wait for a processor to), and what they have
-    /// dropped.
+    /// What its stages take: memory in bytes, how many of them work at a time (or wait for a processor to), and what
+    /// they have dropped.
     fn look(&self) -> Result<(f64, f64, f64)> {
         let args = ["top", "--once", "--json", "--interval", "2", "--run", &self.name];
         let top = Command::new(std::env::current_exe()?).args(args).stderr(Stdio::null()).output()?;

@@ -1,8 +1,8 @@
 //! The part of a map that has changed since the last whole map was sent.
 //!
-//! A subscriber with the last whole map has the current map after any later update, even if it missed the updates between: an
-//! update covers all cells that differ from the whole map, and all cells of earlier updates. So the next update applies to the
-//! whole map that is retained for late joiners.
+//! A subscriber with the last whole map has the current map after any later update, even if it missed the updates
+//! between: an update covers all cells that differ from the whole map, and all cells of earlier updates. So the next
+//! update applies to the whole map that is retained for late joiners.
 
 use gridweave_runtime::ros::{GridPrefix, Header, OccupancyGrid, OccupancyGridUpdate};
 
@@ -42,8 +42,8 @@ pub(crate) struct SentMap {
     covered: Option<Rectangle>,
     /// How many cells all updates after the whole map have brought.
     updated_cells: usize,
-    /// The part covered by updates before the whole map. Maps and updates have separate topics, so a subscriber may receive them
-    /// in another order.
+    /// The part covered by updates before the whole map. Maps and updates have separate topics, so a subscriber may
+    /// receive them in another order.
     outdated: Option<Rectangle>,
 }
 
@@ -67,9 +67,9 @@ impl SentMap {
         is_whole.then(|| Self { prefix, whole: cells.clone(), cells, covered: None, updated_cells: 0, outdated: None })
     }
 
-    /// Takes up the next map, and says what is to be sent of it. It is the whole map where another place, size or frame calls for
-    /// that, or a large part has changed, or not everybody hears updates, and once updates would have brought as many cells as
-    /// the map has: so no more is sent than twice what had to be.
+    /// Takes up the next map, and says what is to be sent of it. It is the whole map where another place, size or frame
+    /// calls for that, or a large part has changed, or not everybody hears updates, and once updates would have brought
+    /// as many cells as the map has: so no more is sent than twice what had to be.
     pub(crate) fn take(&mut self, map: &OccupancyGrid<'_>, receives_updates: bool) -> Part {
         let (before, info) = (&self.prefix.info, &map.info);
         let lies_alike = self.prefix.header.frame_id == map.header.frame_id

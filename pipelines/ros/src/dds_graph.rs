@@ -1,5 +1,5 @@
-//! What nodes there are on DDS, and what they publish and subscribe to: endpoints as their participants announce them, with the
-//! names of the nodes that they belong to, which each participant publishes in one message.
+//! What nodes there are on DDS, and what they publish and subscribe to: endpoints as their participants announce them,
+//! with the names of the nodes that they belong to, which each participant publishes in one message.
 
 use super::dds_names::{NodeName, nodes};
 use super::key_expression::{NO_HASH, Topic, type_of_key};

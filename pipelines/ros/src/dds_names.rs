@@ -1,5 +1,5 @@
-//! The names of nodes on DDS: `rmw_dds_common/msg/ParticipantEntitiesInfo`, in which a participant says which endpoints are of which
-//! of its nodes.
+//! The names of nodes on DDS: `rmw_dds_common/msg/ParticipantEntitiesInfo`, in which a participant says which endpoints
+//! are of which of its nodes.
 
 use super::rtps::{Cursor, Guid, push_text};
 use std::fmt;

@@ -1,5 +1,5 @@
-//! A ROS 2 node over DDS, with its publishers and subscribers. Topics have a prefix, types their names in DDS, and the hash of a type
-//! is among the user data of its endpoints.
+//! A ROS 2 node over DDS, with its publishers and subscribers. Topics have a prefix, types their names in DDS, and the
+//! hash of a type is among the user data of its endpoints.
 
 use super::dds_graph::{Graph, NAMES_TOPIC, TOPIC_PREFIX};
 use super::dds_names::{self, NodeName, TYPE, TYPE_HASH};

@@ -44,8 +44,8 @@ impl Definitions {
         Self { folders: std::env::split_paths(&prefixes).map(|prefix| prefix.join("share")).collect() }
     }
 
-    /// The definition of a topic's type and of all types that it uses, as in a log (`ros2msg`): of several the one with the
-    /// topic's hash, if there is one.
+    /// The definition of a topic's type and of all types that it uses, as in a log (`ros2msg`): of several the one with
+    /// the topic's hash, if there is one.
     pub(crate) fn text(&self, topic: &Topic) -> Option<String> {
         let candidates: Vec<String> = match topic.ros_type.as_str() {
             RANGE => schema_text(RANGE).into_iter().chain([self.with_used(RANGE, LATER_RANGE)]).collect(),

@@ -14,7 +14,8 @@ pub(crate) enum Event<M> {
     Message { topic: usize, message: M, arrived: i64 },
 }
 
-/// A queue of events with a limited number of messages per topic. Beyond it the oldest is dropped, like `keep_last` of ROS.
+/// A queue of events with a limited number of messages per topic. Beyond it the oldest is dropped, like `keep_last` of
+/// ROS.
 pub(crate) struct Inbox<M> {
     state: Mutex<State<M>>,
     has_come: Condvar,

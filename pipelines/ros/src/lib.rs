@@ -1,8 +1,8 @@
-//! ROS 2 without ROS: stages that subscribe to the topics of robots and publish results, over DDS, the default middleware of ROS 2,
-//! and over [Zenoh](https://zenoh.io) with the protocol of `rmw_zenoh_cpp`.
+//! ROS 2 without ROS: stages that subscribe to the topics of robots and publish results, over DDS, the default
+//! middleware of ROS 2, and over [Zenoh](https://zenoh.io) with the protocol of `rmw_zenoh_cpp`.
 //!
-//! The binary `gridweave-ros` is the command `gridweave` with these additional kinds. A program with its own stages adds
-//! [`kinds`] in the same way:
+//! The binary `gridweave-ros` is the command `gridweave` with these additional kinds. A program with its own stages
+//! adds [`kinds`] in the same way:
 //!
 //! ```no_run
 //! fn main() -> std::process::ExitCode {
@@ -10,8 +10,9 @@
 //! }
 //! ```
 //!
-//! The protocol of DDS is DDSI-RTPS. That of Zenoh is documented in `docs/design.md` of `rmw_zenoh`: [key expressions](key_expression) of topics, [liveliness
-//! tokens](liveliness) for discovery, and [attachments](attachment) of messages.
+//! The protocol of DDS is DDSI-RTPS. That of Zenoh is documented in `docs/design.md` of `rmw_zenoh`: [key
+//! expressions](key_expression) of topics, [liveliness tokens](liveliness) for discovery, and [attachments](attachment)
+//! of messages.
 
 #![forbid(unsafe_code)]
 

@@ -1,5 +1,5 @@
-//! Liveliness tokens: the discovery of nodes, publishers and subscribers by ROS 2 programs, such as `ros2 node list` and
-//! `ros2 topic list`.
+//! Liveliness tokens: the discovery of nodes, publishers and subscribers by ROS 2 programs, such as `ros2 node list`
+//! and `ros2 topic list`.
 
 use super::key_expression::{Topic, type_in_keys, type_of_key};
 use super::qos::Qos;

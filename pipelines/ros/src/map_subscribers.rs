@@ -58,8 +58,9 @@ impl MapSubscribers {
         }
     }
 
-    /// Whether a map has subscribers, and every node that subscribes to it subscribes to its updates too. Nodes of a process whose
-    /// names are not known are one here, and subscribe to updates as often as to the map if each of them does.
+    /// Whether a map has subscribers, and every node that subscribes to it subscribes to its updates too. Nodes of a
+    /// process whose names are not known are one here, and subscribe to updates as often as to the map if each of them
+    /// does.
     pub(crate) fn receives_updates(&self, map: &str) -> bool {
         let state = self.lock();
         let counts = |topic: &str| {

@@ -1,8 +1,9 @@
 //! Publishing of maps: whole maps, and updates of the changed parts between them.
 //!
 //! A whole map is retained for late joiners (transient local), and updates apply to it; see
-//! [`changed_part`](super::changed_part). Updates are not retained (volatile): an old update applied to a later whole map would
-//! revert changes. So a late joiner after updates receives an outdated map first, and a whole map is sent for it at once.
+//! [`changed_part`](super::changed_part). Updates are not retained (volatile): an old update applied to a later whole
+//! map would revert changes. So a late joiner after updates receives an outdated map first, and a whole map is sent for
+//! it at once.
 
 use super::changed_part::{Part, Rectangle, SentMap};
 use super::key_expression::Topic;

@@ -101,7 +101,8 @@ impl Node {
         self.zenoh.is_some()
     }
 
-    /// The addresses of Zenoh's routers, if it is to be on Zenoh and is connected to neither a router nor another program.
+    /// The addresses of Zenoh's routers, if it is to be on Zenoh and is connected to neither a router nor another
+    /// program.
     pub(crate) fn looks_for_router(&self) -> Option<String> {
         self.zenoh.as_ref().and_then(ZenohNode::looks_for_router)
     }
@@ -144,7 +145,8 @@ impl Node {
         Ok(Publisher { dds, zenoh: self.zenoh.as_mut().map(|node| node.publish(topic, qos)).transpose()? })
     }
 
-    /// Subscribes to a topic on a middleware: calls `call` with each message, first with those that its publishers have retained.
+    /// Subscribes to a topic on a middleware: calls `call` with each message, first with those that its publishers have
+    /// retained.
     ///
     /// # Errors
     /// The topic has an invalid name, or a session has failed.

@@ -29,8 +29,8 @@ impl Qos {
     }
 }
 
-/// `RELIABILITY:DURABILITY:HISTORY,DEPTH:DEADLINE:LIFESPAN:LIVELINESS`. An omitted part has its default: reliable, volatile, the
-/// last 42, without time limits.
+/// `RELIABILITY:DURABILITY:HISTORY,DEPTH:DEADLINE:LIFESPAN:LIVELINESS`. An omitted part has its default: reliable,
+/// volatile, the last 42, without time limits.
 impl fmt::Display for Qos {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let reliability = if self.is_reliable { "" } else { "2" };

@@ -54,7 +54,8 @@ fn robot_tree(entity: &Entity) -> Option<(String, String)> {
     Some((robot, namespace.to_owned()))
 }
 
-/// A transform to a frame of a robot, with the name of the frame in the robot's tree; `None` for the frame of another robot.
+/// A transform to a frame of a robot, with the name of the frame in the robot's tree; `None` for the frame of another
+/// robot.
 pub(crate) fn in_robot_tree(robot: &str, transform: &TransformStamped) -> Option<TransformStamped> {
     let child_frame_id = transform.child_frame_id.strip_prefix(robot)?.strip_prefix('/')?.to_owned();
     Some(TransformStamped { child_frame_id, ..transform.clone() })

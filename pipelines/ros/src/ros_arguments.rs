@@ -1,5 +1,5 @@
-//! What to write instead of the arguments that programs of ROS take: remappings and parameters, as on the command line of a node, or of a
-//! launch file.
+//! What to write instead of the arguments that programs of ROS take: remappings and parameters, as on the command line
+//! of a node, or of a launch file.
 
 use std::fmt::Write;
 use std::iter::Peekable;
@@ -29,7 +29,8 @@ struct Instead {
     notes: Vec<String>,
 }
 
-/// What to write instead of these arguments, the name of the program not among them; `None` if they have nothing of ROS.
+/// What to write instead of these arguments, the name of the program not among them; `None` if they have nothing of
+/// ROS.
 pub fn advice(arguments: &[String]) -> Option<String> {
     let verb = arguments.iter().find(|argument| !argument.starts_with('-'))?;
     let launch_file = arguments.iter().find(|argument| LAUNCH_FILES.iter().any(|end| argument.ends_with(end)));

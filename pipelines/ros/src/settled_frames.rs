@@ -4,19 +4,19 @@ use gridweave_runtime::ros::{RobotFrame, RobotFrames, TransformStamped};
 use nalgebra::{Isometry2, Matrix3, Vector2, Vector3};
 use std::collections::BTreeMap;
 
-/// A change is more than its uncertainty if it lies outside of the region that holds the truth with a probability of 0.95: the
-/// quantile of the chi-squared distribution with three degrees of freedom.
+/// A change is more than its uncertainty if it lies outside of the region that holds the truth with a probability of
+/// 0.95: the quantile of the chi-squared distribution with three degrees of freedom.
 const BEYOND: f64 = 7.815;
 /// Smaller differences come of rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Static transforms as they were told to others. Whoever listens has planned with them, and so they change only where that is
-/// better by more than its uncertainty.
+/// Static transforms as they were told to others. Whoever listens has planned with them, and so they change only where
+/// that is better by more than its uncertainty.
 ///
-/// They are static although they change: tf2 (`StaticCache`) holds the last one for all times, and what changes is not where a
-/// frame lies but what is known of it. On `/tf` one would hold between stamps only, of whose clock nothing is known here; and no
-/// frame may be on both, as tf2 (`BufferCore::setTransform`) takes the kind of cache of the last message and drops the other with
-/// all it holds.
+/// They are static although they change: tf2 (`StaticCache`) holds the last one for all times, and what changes is not
+/// where a frame lies but what is known of it. On `/tf` one would hold between stamps only, of whose clock nothing is
+/// known here; and no frame may be on both, as tf2 (`BufferCore::setTransform`) takes the kind of cache of the last
+/// message and drops the other with all it holds.
 #[derive(Debug, Default)]
 pub(crate) struct SettledFrames {
     /// By child frame.
@@ -75,8 +75,8 @@ impl SettledFrames {
         self.told.values()
     }
 
-    /// Whether a transform differs from what was told by more than its uncertainty. What is certain, or of which nothing is
-    /// known, does.
+    /// Whether a transform differs from what was told by more than its uncertainty. What is certain, or of which
+    /// nothing is known, does.
     fn is_beyond(&self, told: &TransformStamped, transform: &TransformStamped) -> bool {
         let (before, after) = (planar(told), planar(transform));
         let moved = after.translation.vector - before.translation.vector;

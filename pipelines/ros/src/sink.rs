@@ -27,14 +27,15 @@ const DEPTH: usize = 10;
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SinkParameters {
-    /// The middlewares of ROS 2 on which everything is published: `auto` for both, `dds` for the default of ROS 2 alone (Fast DDS, Cyclone
-    /// DDS), `zenoh` for `rmw_zenoh_cpp` alone.
+    /// The middlewares of ROS 2 on which everything is published: `auto` for both, `dds` for the default of ROS 2 alone
+    /// (Fast DDS, Cyclone DDS), `zenoh` for `rmw_zenoh_cpp` alone.
     pub middleware: Middlewares,
-    /// Where programs on DDS are looked for: `subnet` for the networks of this machine, `localhost` for this machine alone. If it is not
-    /// given, the environment variables ROS_LOCALHOST_ONLY and ROS_AUTOMATIC_DISCOVERY_RANGE say it, as for ROS 2 programs.
+    /// Where programs on DDS are looked for: `subnet` for the networks of this machine, `localhost` for this machine
+    /// alone. If it is not given, the environment variables ROS_LOCALHOST_ONLY and ROS_AUTOMATIC_DISCOVERY_RANGE say
+    /// it, as for ROS 2 programs.
     pub discovery_range: Option<DiscoveryRange>,
-    /// Machines on which programs on DDS are looked for one by one, by name or address, where multicast does not reach them. If none are
-    /// given, those that the environment variable ROS_STATIC_PEERS names.
+    /// Machines on which programs on DDS are looked for one by one, by name or address, where multicast does not reach
+    /// them. If none are given, those that the environment variable ROS_STATIC_PEERS names.
     pub static_peers: Vec<String>,
     /// The ROS domain. The default is the environment variable ROS_DOMAIN_ID, or 0.
     pub domain: Option<u32>,
@@ -42,16 +43,16 @@ pub struct SinkParameters {
     pub connect: Vec<String>,
     /// The addresses where other programs may connect, as `tcp/HOST:PORT`; port 0 is any free port.
     pub listen: Vec<String>,
-    /// A configuration file of Zenoh (JSON5) that replaces `connect` and `listen`, for example for TLS. The default is the
-    /// environment variable ZENOH_SESSION_CONFIG_URI, as for ROS 2 programs.
+    /// A configuration file of Zenoh (JSON5) that replaces `connect` and `listen`, for example for TLS. The default is
+    /// the environment variable ZENOH_SESSION_CONFIG_URI, as for ROS 2 programs.
     pub zenoh_config: Option<PathBuf>,
     /// The name of the ROS 2 node; the default is `gridweave_` and the name of the stage.
     pub node: Option<String>,
     /// Topics with other names than in a log, as `OLD=NEW`: `["/map=/fleet/map"]`. `{robot}` matches one part of both.
     pub rename: Vec<String>,
     /// Whether changed parts of a map are published on its topic with the suffix `_updates`
-    /// (`map_msgs/msg/OccupancyGridUpdate`), if every node that subscribes to the map subscribes to these too. The whole map is
-    /// sent if any node does not, for a late joiner, and once updates would have as many cells as the map.
+    /// (`map_msgs/msg/OccupancyGridUpdate`), if every node that subscribes to the map subscribes to these too. The
+    /// whole map is sent if any node does not, for a late joiner, and once updates would have as many cells as the map.
     pub map_updates: bool,
 }
 
@@ -212,8 +213,8 @@ impl RosSink {
         self.renames.iter().find_map(|rename| rename.apply(topic)).unwrap_or_else(|| topic.to_owned())
     }
 
-    /// Publishes the static transforms of all frames in one message, because a publisher retains its last message only. Settled
-    /// frames are unchanged.
+    /// Publishes the static transforms of all frames in one message, because a publisher retains its last message only.
+    /// Settled frames are unchanged.
     fn publish_frames(&mut self, topic: &str, message: &TFMessage, output: &Output<()>) -> Result<(), StageError> {
         let mut is_changed = false;
         for transform in &message.transforms {

@@ -18,8 +18,8 @@ use zenoh_ext::{
     HistoryConfig, MissDetectionConfig, RecoveryConfig,
 };
 
-/// The period at which a transient-local publisher sends its sequence number after a new message, so that subscribers detect
-/// missed messages; the same as in `rmw_zenoh`.
+/// The period at which a transient-local publisher sends its sequence number after a new message, so that subscribers
+/// detect missed messages; the same as in `rmw_zenoh`.
 const HEARTBEAT: Duration = Duration::from_millis(500);
 /// The timeout of a request for the history of a publisher.
 const HISTORY_TIMEOUT: Duration = Duration::from_secs(600);

@@ -17,8 +17,8 @@ use std::path::PathBuf;
 /// Arguments of `gridweave cat`.
 #[derive(Debug, Args)]
 pub(crate) struct CatArgs {
-    /// Logs (MCAP, SQLite of rosbag2, rosbag2 folders, ROS 1 bags), by log time. ROBOT=LOG puts the topics and frames of a log
-    /// under the name of its robot; otherwise all names are those of the log.
+    /// Logs (MCAP, SQLite of rosbag2, rosbag2 folders, ROS 1 bags), by log time. ROBOT=LOG puts the topics and frames
+    /// of a log under the name of its robot; otherwise all names are those of the log.
     #[arg(required = true, value_name = "LOG")]
     pub(crate) inputs: Vec<PathBuf>,
     #[command(flatten)]

@@ -14,12 +14,12 @@ const PIPELINE: &str = "cut";
 /// Arguments of `gridweave convert`.
 #[derive(Debug, Args)]
 pub(crate) struct ConvertArgs {
-    /// Logs (MCAP, SQLite of rosbag2, rosbag2 folders, ROS 1 bags), written as one, by log time. ROBOT=LOG puts the topics
-    /// and frames of a log under the name of its robot.
+    /// Logs (MCAP, SQLite of rosbag2, rosbag2 folders, ROS 1 bags), written as one, by log time. ROBOT=LOG puts the
+    /// topics and frames of a log under the name of its robot.
     #[arg(required = true, value_name = "LOG")]
     pub(crate) inputs: Vec<PathBuf>,
-    /// The output: an MCAP file; a rosbag2 folder with one: an existing folder, or FOLDER/ with a slash at the end; or, for
-    /// FILE.bag, a ROS 1 bag.
+    /// The output: an MCAP file; a rosbag2 folder with one: an existing folder, or FOLDER/ with a slash at the end; or,
+    /// for FILE.bag, a ROS 1 bag.
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
     #[command(flatten)]

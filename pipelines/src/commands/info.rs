@@ -21,7 +21,8 @@ use std::path::PathBuf;
 /// Arguments of `gridweave info`.
 #[derive(Debug, Args)]
 pub(crate) struct InfoArgs {
-    /// Logs (MCAP, SQLite of rosbag2, rosbag2 folders, ROS 1 bags), each as LOG or ROBOT=LOG, or map files (map_server YAML).
+    /// Logs (MCAP, SQLite of rosbag2, rosbag2 folders, ROS 1 bags), each as LOG or ROBOT=LOG, or map files (map_server
+    /// YAML).
     #[arg(required = true, value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
     /// Find the robots by the topic patterns of this pipeline.
@@ -134,8 +135,8 @@ fn write_beside(file: &FileInfo, text: &mut String) -> std::fmt::Result {
     }
 }
 
-/// Makes the table of topics, with times in seconds from `origin`: for each topic its rate, the longest gap between two messages,
-/// the quality of service that the log records, and the frames in its messages.
+/// Makes the table of topics, with times in seconds from `origin`: for each topic its rate, the longest gap between two
+/// messages, the quality of service that the log records, and the frames in its messages.
 fn topic_table(topics: &[TopicInfo], origin: f64) -> Table {
     let mut table =
         Table::new(["topic", "type", "messages", "size", "first s", "last s", "Hz", "gap s", "QoS", "frame"]);

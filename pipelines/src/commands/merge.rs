@@ -15,12 +15,13 @@ use std::path::{Path, PathBuf};
 /// Arguments of `gridweave merge`.
 #[derive(Debug, Args)]
 pub(crate) struct MergeArgs {
-    /// Logs (MCAP, SQLite of rosbag2, rosbag2 folders, ROS 1 bags); ROBOT=LOG puts the topics and frames of a log under the name
-    /// of its robot. Or map files (map_server YAML), one for each robot; the name of the file is that of the robot.
+    /// Logs (MCAP, SQLite of rosbag2, rosbag2 folders, ROS 1 bags); ROBOT=LOG puts the topics and frames of a log under
+    /// the name of its robot. Or map files (map_server YAML), one for each robot; the name of the file is that of the
+    /// robot.
     #[arg(required = true, value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
-    /// The output: a log (FOLDER/, with a slash at the end, is a rosbag2 folder, FILE.bag a ROS 1 bag) or, for FILE.yaml, only the
-    /// merged map (map_server YAML, with the image beside it).
+    /// The output: a log (FOLDER/, with a slash at the end, is a rosbag2 folder, FILE.bag a ROS 1 bag) or, for
+    /// FILE.yaml, only the merged map (map_server YAML, with the image beside it).
     #[arg(short, long, value_name = "OUT")]
     pub(crate) output: PathBuf,
     #[command(flatten)]
@@ -58,8 +59,8 @@ impl MergeArgs {
     }
 }
 
-/// Whether logs have tags and no maps, so that only frames can be estimated, and no map is asked for. Logs that cannot be read are
-/// errors of the run.
+/// Whether logs have tags and no maps, so that only frames can be estimated, and no map is asked for. Logs that cannot
+/// be read are errors of the run.
 fn has_only_tags(args: &MergeArgs) -> Result<bool, BadUse> {
     if args.options.map.is_some() || args.options.picture.is_some() || is_yaml(&args.output) {
         return Ok(false);

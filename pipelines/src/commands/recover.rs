@@ -13,8 +13,8 @@ use std::path::PathBuf;
 /// Arguments of `gridweave recover`.
 #[derive(Debug, Args)]
 pub(crate) struct RecoverArgs {
-    /// A cut or damaged log: MCAP, SQLite of rosbag2, a rosbag2 folder, a ROS 1 bag, or the NAME.part of a killed run. It is not
-    /// changed.
+    /// A cut or damaged log: MCAP, SQLite of rosbag2, a rosbag2 folder, a ROS 1 bag, or the NAME.part of a killed run.
+    /// It is not changed.
     #[arg(value_name = "LOG")]
     pub(crate) input: PathBuf,
     /// The output: an MCAP file, or FOLDER/, with a slash at the end, for a rosbag2 folder.

@@ -12,16 +12,16 @@ use std::path::PathBuf;
 pub(crate) struct RunArgs {
     /// A pipeline file, or the name of a shipped pipeline such as `tag_merge`.
     pub(crate) pipeline: PathBuf,
-    /// A log to read (MCAP file or rosbag2 folder); several are merged by log time. ROBOT=LOG puts its topics and frames under
-    /// the name of its robot. Pipelines for map files read the map of a robot (map_server YAML), those for topological maps the
-    /// topological map of a robot (JSON).
+    /// A log to read (MCAP file or rosbag2 folder); several are merged by log time. ROBOT=LOG puts its topics and
+    /// frames under the name of its robot. Pipelines for map files read the map of a robot (map_server YAML), those for
+    /// topological maps the topological map of a robot (JSON).
     #[arg(short, long, value_name = "LOG")]
     pub(crate) input: Vec<PathBuf>,
     /// The log to write; FOLDER/, with a slash at the end, is a rosbag2 folder.
     #[arg(short, long, value_name = "LOG")]
     pub(crate) output: Option<PathBuf>,
-    /// Show the run in the Foxglove app over a WebSocket on this address, by default 127.0.0.1:8765. Only programs of this machine
-    /// can connect there; 0.0.0.0 lets others in.
+    /// Show the run in the Foxglove app over a WebSocket on this address, by default 127.0.0.1:8765. Only programs of
+    /// this machine can connect there; 0.0.0.0 lets others in.
     #[arg(long, value_name = "[HOST:]PORT", num_args = 0..=1, require_equals = true, default_missing_value = STANDARD_VIEW)]
     pub(crate) view: Option<String>,
     #[command(flatten)]

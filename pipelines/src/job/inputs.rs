@@ -17,8 +17,8 @@ pub(crate) enum Inputs {
 }
 
 impl Inputs {
-    /// Finds the kind by the names of the files. Images of maps, JSON files beside others, and robots with names that are
-    /// too long are errors.
+    /// Finds the kind by the names of the files. Images of maps, JSON files beside others, and robots with names that
+    /// are too long are errors.
     pub(crate) fn of(paths: &[PathBuf]) -> Result<Self, BadUse> {
         let mut robots = paths.iter().filter_map(|path| Input::new(path).robot);
         if let Some(error) = robots.find_map(|robot| FixedText::<LONGEST_ROBOT_NAME>::new(&robot).err()) {
@@ -51,8 +51,8 @@ impl Inputs {
         }
     }
 
-    /// The same for a pipeline that the user has chosen: a map file of the form `ROBOT=FILE` is a log of that robot, which any
-    /// pipeline of logs reads.
+    /// The same for a pipeline that the user has chosen: a map file of the form `ROBOT=FILE` is a log of that robot,
+    /// which any pipeline of logs reads.
     pub(crate) fn of_run(paths: &[PathBuf]) -> Result<Self, BadUse> {
         let is_named = |typed: &PathBuf| Input::new(typed).robot.is_some();
         Ok(match Self::of(paths)? {

@@ -193,8 +193,8 @@ impl Job<'_> {
         files.find(|(_, file)| file.as_os_str() == typed).map_or_else(|| typed.to_owned(), |(robot, _)| robot)
     }
 
-    /// The reference, if the user names one; and with initial poses of map files, whose robots are known beforehand, the one
-    /// that the frame solver would take, so that one initial pose says how its robot lies to that.
+    /// The reference, if the user names one; and with initial poses of map files, whose robots are known beforehand,
+    /// the one that the frame solver would take, so that one initial pose says how its robot lies to that.
     fn reference(&self) -> Option<String> {
         let first = || {
             let is_needed = !self.options.initial.is_empty() && self.kind == Inputs::MapFiles;

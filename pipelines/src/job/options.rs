@@ -14,12 +14,12 @@ pub(crate) struct RunOptions {
     /// Write the merged map as a map file (map_server YAML, with the image beside it).
     #[arg(long, value_name = "FILE.yaml")]
     pub(crate) map: Option<PathBuf>,
-    /// Draw the merged maps, the walls of each robot in another colour, as FILE.png, .svg or .pdf; `gridweave render` has
-    /// more options.
+    /// Draw the merged maps, the walls of each robot in another colour, as FILE.png, .svg or .pdf; `gridweave render`
+    /// has more options.
     #[arg(long, value_name = "FILE.png")]
     pub(crate) picture: Option<PathBuf>,
-    /// The engine that runs the stages: single, threads (the default for a replay), threads-ipc, or processes (for a live
-    /// pipeline). The result is the same.
+    /// The engine that runs the stages: single, threads (the default for a replay), threads-ipc, or processes (for a
+    /// live pipeline). The result is the same.
     #[arg(long)]
     pub(crate) engine: Option<EngineKind>,
     /// Seed of all random numbers.
@@ -28,12 +28,12 @@ pub(crate) struct RunOptions {
     /// The robot whose map frame is the world; by default the first by name when the first two are merged.
     #[arg(long, value_name = "ROBOT")]
     pub(crate) reference: Option<String>,
-    /// The approximate pose of a robot's map frame, metres and radians, in the frame of the reference or in one in which the
-    /// pose of another robot is also given. The standard deviations are 1 m and 0.2 radians by default.
+    /// The approximate pose of a robot's map frame, metres and radians, in the frame of the reference or in one in
+    /// which the pose of another robot is also given. The standard deviations are 1 m and 0.2 radians by default.
     #[arg(long, value_name = "ROBOT=X,Y,YAW[,STDDEV[,YAW_STDDEV]]", allow_hyphen_values = true)]
     pub(crate) initial: Vec<String>,
-    /// Accept the hypothesis with this number that a refusal has listed for a robot and the reference; `initial` takes its initial
-    /// pose without comparing the maps. ROBOT/ROBOT is the pair of these two.
+    /// Accept the hypothesis with this number that a refusal has listed for a robot and the reference; `initial` takes
+    /// its initial pose without comparing the maps. ROBOT/ROBOT is the pair of these two.
     #[arg(long, value_name = "ROBOT=N")]
     pub(crate) accept: Vec<String>,
     /// Print the evidence for and against the hypotheses of a robot.
@@ -45,8 +45,8 @@ pub(crate) struct RunOptions {
     /// The side of a cell of a robot's map file, metres, instead of the resolution in the file.
     #[arg(long, value_name = "ROBOT=METRES")]
     pub(crate) resolution: Vec<String>,
-    /// The pose of a robot's lidar on its base, metres and radians, instead of that in the log's tf. A fourth number is the
-    /// roll: 3.1416 for a lidar that is mounted upside down.
+    /// The pose of a robot's lidar on its base, metres and radians, instead of that in the log's tf. A fourth number is
+    /// the roll: 3.1416 for a lidar that is mounted upside down.
     #[arg(long, value_name = "ROBOT=X,Y,YAW[,ROLL]", allow_hyphen_values = true)]
     pub(crate) lidar: Vec<String>,
     #[command(flatten)]

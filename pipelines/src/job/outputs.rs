@@ -1,4 +1,5 @@
-//! Check of the outputs before a run: no input is overwritten, no file is written twice or by another run, and all are writable.
+//! Check of the outputs before a run: no input is overwritten, no file is written twice or by another run, and all are
+//! writable.
 
 use super::options::RunOptions;
 use crate::status::BadUse;
@@ -11,12 +12,13 @@ use gridweave_logs::sink::is_ros1_bag;
 use gridweave_runtime::pipeline::Pipeline;
 use std::path::{Path, PathBuf};
 
-/// Checks all files that the sinks of a pipeline and the options name, and the trace. `file` is that of the pipeline, if it has one.
+/// Checks all files that the sinks of a pipeline and the options name, and the trace. `file` is that of the pipeline,
+/// if it has one.
 ///
 /// # Errors
 ///
-/// A log has the ending of another format. An output is an input, under whatever name, or is in the folder of one; two are the same; one is not writable, or is being
-/// written by another run.
+/// A log has the ending of another format. An output is an input, under whatever name, or is in the folder of one; two
+/// are the same; one is not writable, or is being written by another run.
 pub(crate) fn check(pipeline: &Pipeline, file: Option<&Path>, options: &RunOptions) -> Result<()> {
     let inputs: Vec<PathBuf> = inputs(pipeline).into_iter().chain(file.map(Path::to_owned)).collect();
     let mut outputs = outputs(pipeline, options);
@@ -41,7 +43,8 @@ pub(crate) fn check(pipeline: &Pipeline, file: Option<&Path>, options: &RunOptio
     Ok(())
 }
 
-/// Checks that a file that a command writes is none of its inputs, under whatever name, nor the image of one that is a map.
+/// Checks that a file that a command writes is none of its inputs, under whatever name, nor the image of one that is a
+/// map.
 ///
 /// # Errors
 ///
@@ -62,7 +65,8 @@ fn is_an_input(output: &Path) -> anyhow::Error {
     BadUse(format!("{} is an input, and would be overwritten: choose another output", output.display())).into()
 }
 
-/// Checks that the file of a log, which is written as MCAP or as a ROS 1 bag, does not have the ending of another format.
+/// Checks that the file of a log, which is written as MCAP or as a ROS 1 bag, does not have the ending of another
+/// format.
 ///
 /// # Errors
 ///

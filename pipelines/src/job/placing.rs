@@ -32,8 +32,8 @@ impl Outputs {
         Self { logs: files_of(pipeline, LOG_SINK, "file"), others: images.chain(others).collect() }
     }
 
-    /// Puts the files in their places after the run has ended well, together with the summary, its path and its text. If one
-    /// cannot be written, none is replaced.
+    /// Puts the files in their places after the run has ended well, together with the summary, its path and its text.
+    /// If one cannot be written, none is replaced.
     pub(crate) fn place(&self, summary: Option<(&Path, &str)>) -> Result<()> {
         let written: Vec<(&Path, &[u8])> = summary.iter().map(|(path, text)| (*path, text.as_bytes())).collect();
         leave(&written)?;
@@ -45,9 +45,9 @@ impl Outputs {
         Ok(placed?)
     }
 
-    /// Ends the files of a run that failed for this `reason`. Logs whose sinks were killed are closed with it; a log takes its
-    /// name if no file is there. What else was written is removed. Files of other runs are locked, and what an earlier killed
-    /// run had left was removed when this run began.
+    /// Ends the files of a run that failed for this `reason`. Logs whose sinks were killed are closed with it; a log
+    /// takes its name if no file is there. What else was written is removed. Files of other runs are locked, and what
+    /// an earlier killed run had left was removed when this run began.
     pub(crate) fn close(&self, reason: &str) {
         for log in &self.logs {
             match close_log(log, reason) {

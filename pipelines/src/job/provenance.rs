@@ -7,8 +7,8 @@ use gridweave_runtime::pipeline::{Pipeline, StageSpec};
 use std::path::Path;
 use toml::Value;
 
-/// Passes the pipeline and the names of the input files to the log sinks. Paths and properties of the machine are left out,
-/// so that the same run elsewhere gives the same log.
+/// Passes the pipeline and the names of the input files to the log sinks. Paths and properties of the machine are left
+/// out, so that the same run elsewhere gives the same log.
 pub(super) fn record(pipeline: &mut Pipeline) {
     let mut recorded = pipeline.clone();
     recorded.stages.iter_mut().for_each(remove_paths);

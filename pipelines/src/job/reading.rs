@@ -20,8 +20,8 @@ pub(crate) struct NamingOptions {
     /// Read only these topics; `{robot}` matches any one part.
     #[arg(long, visible_alias = "topic", value_name = "TOPIC", value_delimiter = ',')]
     pub(crate) topics: Vec<String>,
-    /// Shift the times of all logs, and the stamps in their messages, so that they begin together with the first one: for robots
-    /// with unsynchronised clocks.
+    /// Shift the times of all logs, and the stamps in their messages, so that they begin together with the first one:
+    /// for robots with unsynchronised clocks.
     #[arg(long)]
     pub(crate) align_start: bool,
 }
@@ -31,7 +31,8 @@ pub(crate) struct NamingOptions {
 pub(crate) struct ReadingOptions {
     #[command(flatten)]
     pub(crate) names: NamingOptions,
-    /// Seconds from the first message at which to begin. The last maps, and other latched messages, from before are included.
+    /// Seconds from the first message at which to begin. The last maps, and other latched messages, from before are
+    /// included.
     #[arg(long, value_name = "SECONDS")]
     pub(crate) start: Option<f64>,
     /// Seconds from the first message at which to end.

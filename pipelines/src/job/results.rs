@@ -1,5 +1,5 @@
-//! Sinks that are added to a run for its options: the summary, the merged map as a file, and its picture. They read messages
-//! by their types, whatever stages send them.
+//! Sinks that are added to a run for its options: the summary, the merged map as a file, and its picture. They read
+//! messages by their types, whatever stages send them.
 
 use super::options::RunOptions;
 use crate::status::BadUse;

@@ -12,8 +12,8 @@ const VIEW: &str = "foxglove_sink";
 /// The default address, which is that of the stage.
 pub(crate) const STANDARD_VIEW: &str = "127.0.0.1:8765";
 
-/// Adds the view to a pipeline: it shows the messages that its logs contain or, without logs, all messages between its stages.
-/// Returns the address to open.
+/// Adds the view to a pipeline: it shows the messages that its logs contain or, without logs, all messages between its
+/// stages. Returns the address to open.
 ///
 /// # Errors
 /// The address is wrong, or this program has no such stage.
@@ -41,8 +41,8 @@ pub(super) fn attach(pipeline: &mut Pipeline, registry: &Registry, address: &str
     Ok(format!("ws://{host}:{port}"))
 }
 
-/// Finds a free port of the host, since the stage may be in another process and could not report the one it has chosen. 0 if
-/// there is none, or no such host, which the stage reports.
+/// Finds a free port of the host, since the stage may be in another process and could not report the one it has chosen.
+/// 0 if there is none, or no such host, which the stage reports.
 fn free_port(host: &str) -> u16 {
     let host = host.trim_start_matches('[').trim_end_matches(']');
     TcpListener::bind((host, 0)).and_then(|listener| listener.local_addr()).map_or(0, |address| address.port())

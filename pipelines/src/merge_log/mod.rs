@@ -1,5 +1,5 @@
-//! The state of a merge at one moment of a log: the last map of each robot, its pose, and what was found in it. Pictures and
-//! reports are made from it.
+//! The state of a merge at one moment of a log: the last map of each robot, its pose, and what was found in it.
+//! Pictures and reports are made from it.
 
 mod placing;
 mod reading;

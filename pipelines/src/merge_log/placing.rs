@@ -62,8 +62,8 @@ impl PlacedRobot {
 }
 
 impl Placing {
-    /// Arranges the maps of some robots, or of all: merged maps by their frames, beside them each group that is merged only with
-    /// each other, and then the others. With `is_apart` all maps are beside each other.
+    /// Arranges the maps of some robots, or of all: merged maps by their frames, beside them each group that is merged
+    /// only with each other, and then the others. With `is_apart` all maps are beside each other.
     pub(crate) fn of(state: &MergeState, wanted: &BTreeSet<&str>, is_apart: bool) -> Self {
         let is_wanted = |robot: &str| wanted.is_empty() || wanted.contains(robot);
         let frames = state.frames.as_ref().filter(|_| !is_apart);

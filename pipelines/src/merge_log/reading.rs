@@ -53,8 +53,8 @@ impl Opened {
         found
     }
 
-    /// Reads on up to a moment, in seconds from the first message, or to the end. `each` is called for every ingested message with
-    /// its log time in seconds and its channel.
+    /// Reads on up to a moment, in seconds from the first message, or to the end. `each` is called for every ingested
+    /// message with its log time in seconds and its channel.
     pub(crate) fn read_until(&mut self, end: Option<f64>, mut each: impl FnMut(f64, &Channel)) {
         let is_later = |seconds: f64| end.is_some_and(|end| seconds > end);
         if let Some(pending) = self.pending.take() {

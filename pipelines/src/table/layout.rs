@@ -26,7 +26,8 @@ struct Column {
 }
 
 impl Layout {
-    /// Lays out a table in lines of at most `max_width`: each column on the line of the one before it, if there is room.
+    /// Lays out a table in lines of at most `max_width`: each column on the line of the one before it, if there is
+    /// room.
     pub(super) fn new(table: &Table, max_width: usize) -> Self {
         let columns = table.rows.iter().map(Vec::len).max().unwrap_or(0);
         let cells = |column: usize| table.rows.iter().map(move |row| cell(row, column));

@@ -1,8 +1,9 @@
 //! The address space that an engine reserves, and the limit of the program (`ulimit -v`).
 //!
-//! A thread reserves address space for its stack and for the memory that it will allocate, of which it uses little. Where the
-//! address space ends within that, no error can be returned: the program ends with a signal. Therefore a limit that cannot be
-//! enough is refused before the run. What shared memory reserves beyond it depends on the sizes of messages, and fails with an error.
+//! A thread reserves address space for its stack and for the memory that it will allocate, of which it uses little.
+//! Where the address space ends within that, no error can be returned: the program ends with a signal. Therefore a
+//! limit that cannot be enough is refused before the run. What shared memory reserves beyond it depends on the sizes of
+//! messages, and fails with an error.
 
 use super::{EngineKind, Failure};
 use crate::pipeline::Pipeline;
@@ -16,7 +17,8 @@ const STAGE: u64 = 64 << 20;
 /// A limit below which a run in one thread may end without an error, bytes.
 const LITTLE: u64 = 512 << 20;
 
-/// Checks that an engine can run the stages of a pipeline within the limit of this program, and warns if that is not certain.
+/// Checks that an engine can run the stages of a pipeline within the limit of this program, and warns if that is not
+/// certain.
 ///
 /// # Errors
 /// The limit is too low.

@@ -72,14 +72,15 @@ impl ExternalSender {
         Some(Outputs::sink(&self.outputs, self.ports.binary_search(&port).ok()?))
     }
 
-    /// Waits until every reader and the stage itself, which retains the history for late joiners, are connected, so that none
-    /// misses the first messages. Returns `false` after the timeout.
+    /// Waits until every reader and the stage itself, which retains the history for late joiners, are connected, so
+    /// that none misses the first messages. Returns `false` after the timeout.
     pub fn wait_for_readers(&self, longest: Duration) -> bool {
         self.wait(&self.sleeper, longest, |sender| sender.is_connected())
     }
 
-    /// Waits until every reader and the stage itself have taken all messages; those that were not taken are lost with their
-    /// sender. Returns `false` after the timeout. A stopped sender waits too: it sends no more, but its readers continue.
+    /// Waits until every reader and the stage itself have taken all messages; those that were not taken are lost with
+    /// their sender. Returns `false` after the timeout. A stopped sender waits too: it sends no more, but its readers
+    /// continue.
     pub fn wait_until_taken(&self, longest: Duration) -> bool {
         let sleeper = Sleeper::new(self.sleeper.counters().clone(), Arc::default());
         self.wait(&sleeper, longest, LinkSender::is_taken)
@@ -87,8 +88,8 @@ impl ExternalSender {
 
     /// Waits until all links are ready, and the stage has ingested what was sent so far.
     fn wait(&self, sleeper: &Sleeper, longest: Duration, is_ready: impl Fn(&mut LinkSender<Service>) -> bool) -> bool {
-        // The stage sees the messages of this sender only while it exists: without waiting for the stage, those of a short-lived
-        // sender would be missed.
+        // The stage sees the messages of this sender only while it exists: without waiting for the stage, those of a
+        // short-lived sender would be missed.
         let (counters, asked) = (sleeper.counters(), sleeper.counters().request_ingest());
         let are_ready = || {
             if !self.run.is_running() {

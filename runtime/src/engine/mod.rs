@@ -83,8 +83,8 @@ impl fmt::Display for EngineKind {
 
 /// An observer of a run. It does not influence the result, unless it requests a stop.
 pub trait Observer: Sync {
-    /// Reports the progress of a source: the share of its work that is done (0 to 1) and the log time that it has reached.
-    /// Called from time to time.
+    /// Reports the progress of a source: the share of its work that is done (0 to 1) and the log time that it has
+    /// reached. Called from time to time.
     fn progress(&self, _stage: &str, _share: f64, _log_time: LogTime) {}
 
     /// Reports that all processes of a run were started, with the name prefix of the run.

@@ -3,8 +3,8 @@
 use super::run_folder::{RunFolder, RunFolderError};
 use std::path::Path;
 
-/// A folder that only this user can read, removed on drop. If the command is killed, the cleanup of runs removes it, as it does the
-/// folder of a killed run.
+/// A folder that only this user can read, removed on drop. If the command is killed, the cleanup of runs removes it, as
+/// it does the folder of a killed run.
 #[derive(Debug)]
 pub struct PrivateFolder(Option<RunFolder>);
 

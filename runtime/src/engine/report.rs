@@ -24,7 +24,8 @@ pub struct StageReport {
     pub messages_out: u64,
     /// Messages that a live pipeline has dropped because the stage had not granted credit for them.
     pub dropped: u64,
-    /// How often a live pipeline has restarted it after a failure. Warnings and counts are those since the last restart.
+    /// How often a live pipeline has restarted it after a failure. Warnings and counts are those since the last
+    /// restart.
     pub restarts: u64,
     /// Its working time, without waiting for others.
     pub busy: Duration,

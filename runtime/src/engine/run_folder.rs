@@ -1,8 +1,8 @@
 //! The folder of a run whose shared memory is visible to other processes, and the cleanup after killed runs.
 //!
-//! Each run has a folder in that of its user ([`user_folder`]), named by its prefix. It contains iceoryx2's files, the pipeline,
-//! and a file that the processes of the run keep locked ([`run_lock`](super::run_lock)). A folder that nobody has locked is
-//! left over from a killed run, and so are all files with its prefix in `/dev/shm`.
+//! Each run has a folder in that of its user ([`user_folder`]), named by its prefix. It contains iceoryx2's files, the
+//! pipeline, and a file that the processes of the run keep locked ([`run_lock`](super::run_lock)). A folder that nobody
+//! has locked is left over from a killed run, and so are all files with its prefix in `/dev/shm`.
 
 use super::links::counters_shape;
 use super::run_lock::{LOCK, Removal, lock_for_removal, lock_for_run};
@@ -16,8 +16,8 @@ use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The longest path of the folder of a user, bytes. iceoryx2 takes paths of 255 bytes, and 145 of them may be those of a file in
-/// the folder of a run: its prefix twice, the number of a node, and the hash of a service.
+/// The longest path of the folder of a user, bytes. iceoryx2 takes paths of 255 bytes, and 145 of them may be those of
+/// a file in the folder of a run: its prefix twice, the number of a node, and the hash of a service.
 const LONGEST_PATH: usize = 110;
 
 /// The name of the file with the pipeline of the run.
@@ -164,8 +164,8 @@ impl RunningRun {
         self.folder.join(PIPELINE)
     }
 
-    /// Removes what a program outside of the run, still connected when the run ended, has left in shared memory. Does nothing
-    /// while the run is in progress.
+    /// Removes what a program outside of the run, still connected when the run ended, has left in shared memory. Does
+    /// nothing while the run is in progress.
     pub fn remove_traces(&self) {
         // What cannot be removed is harmless, except that it takes memory until the machine restarts.
         let _ = match lock_for_removal(&self.folder) {
@@ -260,8 +260,8 @@ fn remove(folder: &Path, prefix: &str) -> io::Result<()> {
     ignore_concurrent_removal(fs::remove_dir_all(folder))
 }
 
-/// Ignores the errors of a concurrent removal by another program: a missing file, and a folder that is not empty because the
-/// other program has created its lock, and removes the folder itself.
+/// Ignores the errors of a concurrent removal by another program: a missing file, and a folder that is not empty
+/// because the other program has created its lock, and removes the folder itself.
 fn ignore_concurrent_removal(result: io::Result<()>) -> io::Result<()> {
     match result {
         Err(error) if !matches!(error.kind(), ErrorKind::NotFound | ErrorKind::DirectoryNotEmpty) => Err(error),

@@ -1,7 +1,7 @@
 //! The lock file of a run, which every process of the run keeps locked while it lives.
 //!
-//! The kernel releases the lock when a process dies, whatever the cause. So a folder that nobody has locked is left over from a
-//! killed run; only a program that gets its exclusive lock may remove it.
+//! The kernel releases the lock when a process dies, whatever the cause. So a folder that nobody has locked is left
+//! over from a killed run; only a program that gets its exclusive lock may remove it.
 
 use super::user_folder::OWN_FILE;
 use std::fs::{self, File, TryLockError};

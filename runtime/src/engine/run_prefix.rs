@@ -1,7 +1,7 @@
 //! The prefix of all names of a run: its services, its folder and its files in `/dev/shm`.
 //!
-//! It is random, because machines that share these folders (containers) assign the same process ids. It has one exact format,
-//! so that files of other programs are never mistaken for those of a run.
+//! It is random, because machines that share these folders (containers) assign the same process ids. It has one exact
+//! format, so that files of other programs are never mistaken for those of a run.
 
 use super::user_folder::is_own;
 use crate::link::SHARED_MEMORY_FOLDER;
@@ -38,7 +38,8 @@ pub(super) fn is_prefix(name: &str) -> bool {
     })
 }
 
-/// The path of the shared counters. It is in shared memory, and is removed together with the other files of the run there.
+/// The path of the shared counters. It is in shared memory, and is removed together with the other files of the run
+/// there.
 pub(super) fn counters_path(prefix: &str) -> PathBuf {
     Path::new(SHARED_MEMORY_FOLDER).join(format!("{prefix}counters"))
 }

@@ -96,8 +96,8 @@ impl Runner {
         self.take(wire, message).map(|()| Some(wire))
     }
 
-    /// Checks the memory of messages that cannot be taken yet, although all have one log time: no watermark lies between
-    /// them, so the credit of links does not limit how many there are.
+    /// Checks the memory of messages that cannot be taken yet, although all have one log time: no watermark lies
+    /// between them, so the credit of links does not limit how many there are.
     pub(super) fn check_pending(&self, queues: &[InputQueue]) -> Result<(), Failure> {
         let exceeds = |queue: &&InputQueue| queue.bytes() as u64 > self.same_time_limit && queue.has_single_log_time();
         let Some((queue, input)) = queues.iter().zip(&self.origins).find(|(queue, _)| exceeds(queue)) else {
@@ -155,7 +155,8 @@ impl Runner {
         let _ = catch_unwind(AssertUnwindSafe(|| self.node.abort(reason)));
     }
 
-    /// Drops the stage and returns its report. `waited` is the part of its working time that it spent waiting for others.
+    /// Drops the stage and returns its report. `waited` is the part of its working time that it spent waiting for
+    /// others.
     pub(super) fn into_report(mut self, waited: Duration) -> Result<StageReport, Failure> {
         self.report.messages_out = self.node.messages_sent().sum();
         self.report.warnings = self.node.warnings();

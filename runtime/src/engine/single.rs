@@ -1,8 +1,8 @@
 //! The engine `single`: all stages in one thread.
 //!
-//! In each round the source with the earliest log time sends a few messages; then each stage, in the order of the pipeline,
-//! handles all messages that it can and raises its watermark. Queues stay short, and no stage is ever stuck, as each sees the
-//! watermarks of all stages before it in the same round.
+//! In each round the source with the earliest log time sends a few messages; then each stage, in the order of the
+//! pipeline, handles all messages that it can and raises its watermark. Queues stay short, and no stage is ever stuck,
+//! as each sees the watermarks of all stages before it in the same round.
 
 use super::runner::{Runner, readers};
 use super::{Failure, Observer, RunError, RunReport};

@@ -1,7 +1,8 @@
 //! The folder with the folders of all runs of this user.
 //!
-//! It is `gridweave` in the folder `XDG_RUNTIME_DIR` if that belongs to this user, and `/tmp/gridweave-UID` otherwise. In `/tmp`
-//! anybody can create a folder or a link of that name: only a folder that this user alone can write to is trusted.
+//! It is `gridweave` in the folder `XDG_RUNTIME_DIR` if that belongs to this user, and `/tmp/gridweave-UID` otherwise.
+//! In `/tmp` anybody can create a folder or a link of that name: only a folder that this user alone can write to is
+//! trusted.
 
 use rustix::process::geteuid;
 use std::fs::{self, DirBuilder, Metadata, Permissions};

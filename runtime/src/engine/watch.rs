@@ -20,8 +20,8 @@ const LINK_TIMEOUT: Duration = Duration::from_secs(10);
 /// The interval at which a missing link is looked for.
 const RETRY_INTERVAL: Duration = Duration::from_millis(10);
 
-/// A link of a run that is observed by a program outside of the run. The observer never affects the run: if it is too slow, it
-/// misses messages.
+/// A link of a run that is observed by a program outside of the run. The observer never affects the run: if it is too
+/// slow, it misses messages.
 pub struct WatchedLink {
     observer: Observer<Service>,
     /// The sequence number of the next message of each sender.
@@ -41,11 +41,12 @@ pub struct WatchedLink {
 }
 
 impl WatchedLink {
-    /// Observes an output port of a stage of a run of the given pipeline. A live link repeats the last message of each topic
-    /// for it.
+    /// Observes an output port of a stage of a run of the given pipeline. A live link repeats the last message of each
+    /// topic for it.
     ///
     /// # Errors
-    /// The port has no readers, the run has ended or does not create the link, or the link has the maximum number of observers.
+    /// The port has no readers, the run has ended or does not create the link, or the link has the maximum number of
+    /// observers.
     pub fn open(run: &RunningRun, pipeline: &Pipeline, stage: usize, port: usize) -> Result<Self, RunError> {
         let opening = Opening::new(run, pipeline, stage, port)?;
         let start = Instant::now();

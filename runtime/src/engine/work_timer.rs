@@ -5,8 +5,8 @@ use crate::link::{StageCounter, StageCounters, monotonic_nanoseconds};
 use std::rc::Rc;
 use std::time::Duration;
 
-/// Measures the working time of a stage, and publishes it in the shared counters: the start of the work on the current message,
-/// and the total.
+/// Measures the working time of a stage, and publishes it in the shared counters: the start of the work on the current
+/// message, and the total.
 pub(super) struct WorkTimer {
     counters: StageCounters,
     sleeper: Rc<Sleeper>,

@@ -1,10 +1,10 @@
-//! The shared counters of a run: the state and progress of each stage, in memory that all threads and processes of the run
-//! share.
+//! The shared counters of a run: the state and progress of each stage, in memory that all threads and processes of the
+//! run share.
 //!
-//! They are a list of 64-bit numbers, each written by one stage and readable by anyone at any time. No reader can block a
-//! stage, and the numbers of a killed process remain readable. They have four uses: a sender that waits for credit sees how
-//! far its readers are, a stage sleeps on its doorbell and is woken through it, an observer sees the progress of the run, and
-//! a restarted process continues the counts of the killed one.
+//! They are a list of 64-bit numbers, each written by one stage and readable by anyone at any time. No reader can block
+//! a stage, and the numbers of a killed process remain readable. They have four uses: a sender that waits for credit
+//! sees how far its readers are, a stage sleeps on its doorbell and is woken through it, an observer sees the progress
+//! of the run, and a restarted process continues the counts of the killed one.
 
 use super::histogram::BUCKETS;
 use super::protocol::{Word, ring};
@@ -41,7 +41,8 @@ pub fn monotonic_nanoseconds() -> u64 {
     seconds * 1_000_000_000 + u64::try_from(time.tv_nsec).unwrap_or_default()
 }
 
-/// Offsets of the numbers of a stage: its fixed ones, those of its wires, senders by port, messages by port, and latencies.
+/// Offsets of the numbers of a stage: its fixed ones, those of its wires, senders by port, messages by port, and
+/// latencies.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StageLayout {
     pub(super) stage: usize,
@@ -113,7 +114,8 @@ impl SharedCounters {
     pub fn create(path: &Path, stages: &[(usize, usize)]) -> io::Result<Arc<Self>> {
         let mut file = File::options().read(true).write(true).create_new(true).mode(0o600).open(path)?;
         let (layouts, words) = layouts(stages);
-        // Writing the zeros allocates the memory: without space this fails here, instead of with a signal (SIGBUS) later.
+        // Writing the zeros allocates the memory: without space this fails here, instead of with a signal (SIGBUS)
+        // later.
         file.write_all(&vec![0; words * size_of::<u64>()])?;
         Ok(Arc::new(Self { memory: Memory::Mapped(MmapRaw::map_raw(&file)?), layouts }))
     }
@@ -148,9 +150,9 @@ impl SharedCounters {
             Memory::Heap(lines) => &lines[word / LINE].0[word % LINE],
             Memory::Mapped(memory) => {
                 assert!(word < memory.len() / size_of::<u64>(), "the index is outside of the counters");
-                // SAFETY: the index lies within the mapping, as was checked, and is aligned, as a mapping begins at a page.
-                // The memory lives as long as `self`. Every process accesses it through atomics only, for which any
-                // bits are valid.
+                // SAFETY: the index lies within the mapping, as was checked, and is aligned, as a mapping begins at a
+                // page. The memory lives as long as `self`. Every process accesses it through atomics only, for which
+                // any bits are valid.
                 unsafe { &*memory.as_mut_ptr().cast::<AtomicU64>().add(word) }
             }
         }
@@ -183,8 +185,8 @@ impl Word for AtomicU64 {
             tv_sec: i64::try_from(longest.as_secs()).unwrap_or(i64::MAX),
             tv_nsec: longest.subsec_nanos().into(),
         };
-        // An error means that the word has changed, that a signal arrived, or that the timeout expired. The caller checks its
-        // condition again in any case.
+        // An error means that the word has changed, that a signal arrived, or that the timeout expired. The caller
+        // checks its condition again in any case.
         let _ = futex::wait(half(self), futex::Flags::empty(), value as u32, Some(&longest));
     }
 
@@ -198,7 +200,7 @@ impl Word for AtomicU64 {
 #[allow(unsafe_code)]
 fn half(word: &AtomicU64) -> &AtomicU32 {
     let low = if cfg!(target_endian = "little") { 0 } else { 1 };
-    // SAFETY: both halves lie within the word and are aligned. This process never accesses them separately: it passes the
-    // address to the kernel, which reads it atomically.
+    // SAFETY: both halves lie within the word and are aligned. This process never accesses them separately: it passes
+    // the address to the kernel, which reads it atomically.
     unsafe { &*std::ptr::from_ref(word).cast::<AtomicU32>().add(low) }
 }

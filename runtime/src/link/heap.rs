@@ -1,9 +1,9 @@
 //! Large payloads between threads: buffers on the heap that are passed next to the samples.
 //!
-//! iceoryx2 reserves a slot for every sample that can ever be in use, each with space for the largest payload so far. Between
-//! processes only slots that were written to take memory. Within one process all of them are allocated on the heap at once:
-//! 11 GB for a map of 16 MB and six readers. Therefore a large payload gets a separate buffer there, which all readers share
-//! without copying it, and its sample is sent without a payload.
+//! iceoryx2 reserves a slot for every sample that can ever be in use, each with space for the largest payload so far.
+//! Between processes only slots that were written to take memory. Within one process all of them are allocated on the
+//! heap at once: 11 GB for a map of 16 MB and six readers. Therefore a large payload gets a separate buffer there,
+//! which all readers share without copying it, and its sample is sent without a payload.
 
 use super::LinkError;
 use crate::message::Storage;

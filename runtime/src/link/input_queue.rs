@@ -39,8 +39,8 @@ impl InputQueue {
         self.ended = true;
     }
 
-    /// Sets when the pending messages were sent, nanoseconds on the monotonic clock. A live link has one pending sample at a
-    /// time.
+    /// Sets when the pending messages were sent, nanoseconds on the monotonic clock. A live link has one pending sample
+    /// at a time.
     pub(crate) fn set_sent_at(&mut self, sent_at: u64) {
         self.sent_at = sent_at;
     }

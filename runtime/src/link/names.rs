@@ -36,8 +36,8 @@ impl RunNames {
         Self { prefix: format!("gw{}_{number}_", std::process::id()), scope: Scope::Process(HeapPayloads::default()) }
     }
 
-    /// Names with the given prefix (letters, digits and `_`) and the folder `root` for their files: for a run of several
-    /// processes, all of which must use the same.
+    /// Names with the given prefix (letters, digits and `_`) and the folder `root` for their files: for a run of
+    /// several processes, all of which must use the same.
     pub fn shared(prefix: impl Into<String>, root: impl Into<String>) -> Self {
         Self { prefix: prefix.into(), scope: Scope::Machine { root: root.into() } }
     }
@@ -55,8 +55,8 @@ impl RunNames {
         }
     }
 
-    /// Begins to create something of iceoryx2, where that is in the shared memory of the machine; `doing` describes the purpose. The
-    /// creation ends with the guard.
+    /// Begins to create something of iceoryx2, where that is in the shared memory of the machine; `doing` describes the
+    /// purpose. The creation ends with the guard.
     pub(super) fn begin_creation(
         &self,
         doing: impl FnOnce() -> String,
@@ -88,7 +88,8 @@ impl RunNames {
         Ok(node)
     }
 
-    /// Removes the permissions of other users for iceoryx2's node management segment, which iceoryx2 creates for everybody.
+    /// Removes the permissions of other users for iceoryx2's node management segment, which iceoryx2 creates for
+    /// everybody.
     fn restrict_permissions(&self) -> io::Result<()> {
         for entry in fs::read_dir("/dev/shm")?.flatten() {
             let name = entry.file_name();

@@ -50,8 +50,8 @@ impl<S: Service + 'static> Observer<S> {
         Ok(Some(Self { subscriber, trackers: BTreeMap::new(), name }))
     }
 
-    /// Takes the messages since the last call, without duplicates, each with the header of its sample. Watermarks and ends are
-    /// omitted.
+    /// Takes the messages since the last call, without duplicates, each with the header of its sample. Watermarks and
+    /// ends are omitted.
     pub fn take(&mut self, mut take: impl FnMut(&SampleHeader, Message)) -> Result<(), LinkError> {
         let failed = |cause: &dyn std::fmt::Debug| LinkError::shared(format!("receive from {}", self.name))(cause);
         let mut repeats = Repeats::default();

@@ -1,7 +1,7 @@
 //! The order in which a stage takes its inputs.
 //!
-//! In a replay messages are ordered by log time, then by wire, then as sent. The order depends on the messages only, so it is
-//! the same on every engine. In a live run messages are ordered by the time at which they were sent.
+//! In a replay messages are ordered by log time, then by wire, then as sent. The order depends on the messages only, so
+//! it is the same on every engine. In a live run messages are ordered by the time at which they were sent.
 
 use super::InputQueue;
 use crate::message::LogTime;

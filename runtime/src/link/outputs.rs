@@ -8,8 +8,8 @@ use iceoryx2::service::Service;
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// The outputs of one stage. While one of them waits for credit, the others send their batches and watermarks, so that no
-/// reader of theirs waits for a stage that is itself waiting.
+/// The outputs of one stage. While one of them waits for credit, the others send their batches and watermarks, so that
+/// no reader of theirs waits for a stage that is itself waiting.
 pub struct Outputs<S: Service> {
     links: Vec<LinkSender<S>>,
     sleeper: Rc<Sleeper>,
@@ -81,8 +81,8 @@ impl<S: Service + 'static> Outputs<S> {
         Ok(())
     }
 
-    /// Sends the batches and the end of the stream, at the log time `time`, on every link, and waits until every reader has
-    /// acknowledged it. A reader that joins meanwhile, such as a restarted one, is sent the history and the end.
+    /// Sends the batches and the end of the stream, at the log time `time`, on every link, and waits until every reader
+    /// has acknowledged it. A reader that joins meanwhile, such as a restarted one, is sent the history and the end.
     pub(crate) fn end(&mut self, time: LogTime) -> Result<(), LinkError> {
         for link in 0..self.links.len() {
             self.prepare_single(link, time)?;

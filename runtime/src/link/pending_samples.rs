@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
-/// The memory of pending samples of a link above which its sender waits, bytes. The depth limits how many there are, and a few
-/// compressed bytes of a log can become messages of a gigabyte.
+/// The memory of pending samples of a link above which its sender waits, bytes. The depth limits how many there are,
+/// and a few compressed bytes of a log can become messages of a gigabyte.
 pub(super) const MOST_PENDING_BYTES: u64 = 256 << 20;
 
 /// The pending samples of one sender that are too large for a batch, in the order in which they were sent.

@@ -1,6 +1,6 @@
 //! The part of the protocol that depends on memory ordering: sleeping and waking, and the credit that a reader grants a
-//! sender. It is generic over [`Word`], so that the tests can run it on a model of memory that tries every order that the
-//! language allows.
+//! sender. It is generic over [`Word`], so that the tests can run it on a model of memory that tries every order that
+//! the language allows.
 
 use std::sync::atomic::Ordering::{self, Acquire, Relaxed, Release, SeqCst};
 use std::time::Duration;
@@ -17,7 +17,8 @@ pub(crate) trait Word {
     fn compare_exchange(&self, current: u64, new: u64, success: Ordering, failure: Ordering) -> Result<u64, u64>;
     /// As [`fence`](std::sync::atomic::fence).
     fn fence(ordering: Ordering);
-    /// Sleeps until it is woken, for at most `longest`, and not at all if the word differs from `value`. May return early.
+    /// Sleeps until it is woken, for at most `longest`, and not at all if the word differs from `value`. May return
+    /// early.
     fn sleep(&self, value: u64, longest: Duration);
     /// Wakes all that sleep on the word.
     fn wake_all(&self);
@@ -30,8 +31,8 @@ const RUNG: u64 = 2;
 
 /// Sleeps on a doorbell until it is rung, for at most `longest`, and not at all if `is_ready`. May return early.
 ///
-/// A change made before a ring is either seen by `is_ready`, or the ring ends the sleep: one of the two fences, here and in
-/// [`ring`], comes first.
+/// A change made before a ring is either seen by `is_ready`, or the ring ends the sleep: one of the two fences, here
+/// and in [`ring`], comes first.
 pub(crate) fn sleep<W: Word, E>(
     doorbell: &W,
     longest: Duration,

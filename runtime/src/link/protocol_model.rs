@@ -7,7 +7,8 @@ use loom::thread;
 use std::convert::Infallible;
 use std::time::Duration;
 
-/// A word with a model of the kernel's futex. There are no timeouts here, so a lost wake-up is a deadlock, which loom reports.
+/// A word with a model of the kernel's futex. There are no timeouts here, so a lost wake-up is a deadlock, which loom
+/// reports.
 struct ModelWord {
     value: AtomicU64,
     asleep: Mutex<()>,

@@ -21,8 +21,8 @@ impl Reader {
         Self { end, limit: 0, started: 0, first: 0 }
     }
 
-    /// The number of the first sample without credit, read from the shared counters, for the sender `origin` whose next sample
-    /// is `number`; none while the reader is not connected to it.
+    /// The number of the first sample without credit, read from the shared counters, for the sender `origin` whose next
+    /// sample is `number`; none while the reader is not connected to it.
     pub(super) fn limit(&mut self, origin: u64, number: u64) -> Option<u64> {
         match self.end.counters.limit_of(self.end.wire, origin)? {
             NOTHING_RECEIVED => {

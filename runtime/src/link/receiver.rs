@@ -121,16 +121,16 @@ impl<S: Service + 'static> LinkReceiver<S> {
         })
     }
 
-    /// Moves received messages to `queue`: all of them in a replay, one sample at a time on a live link, because a sender can
-    /// drop only what still waits in shared memory.
+    /// Moves received messages to `queue`: all of them in a replay, one sample at a time on a live link, because a
+    /// sender can drop only what still waits in shared memory.
     pub(crate) fn receive(&mut self, queue: &mut InputQueue) -> Result<(), LinkError> {
         self.connect()?;
         while self.order == Order::LogTime || queue.is_empty() {
             let has_sample = self.order == Order::LogTime && self.has_samples()?;
             match self.subscriber.receive().map_err(|e| self.failed("receive from", &e))? {
                 Some(sample) => self.take_sample(sample, queue)?,
-                // iceoryx2 discards a sample whose memory it cannot map, and reports none. In a replay the sender would wait
-                // for it without end; in a live run its sender may be gone, and the gap in the numbers is counted.
+                // iceoryx2 discards a sample whose memory it cannot map, and reports none. In a replay the sender would
+                // wait for it without end; in a live run its sender may be gone, and the gap in the numbers is counted.
                 None if has_sample => {
                     return Err(self.failed("receive from", &format_args!("that a sample cannot be mapped")));
                 }
@@ -158,8 +158,9 @@ impl<S: Service + 'static> LinkReceiver<S> {
         is_last
     }
 
-    /// Grants credit beyond the depth, or beyond the memory of pending samples, where the stage would be stuck otherwise: if
-    /// all pending messages have the same log time, no watermark can pass it, and the stage cannot take them.
+    /// Grants credit beyond the depth, or beyond the memory of pending samples, where the stage would be stuck
+    /// otherwise: if all pending messages have the same log time, no watermark can pass it, and the stage cannot take
+    /// them.
     pub(crate) fn extend_credit(&mut self, queue: &InputQueue) {
         if queue.is_empty() || !queue.has_single_log_time() {
             return;
@@ -309,8 +310,8 @@ impl<S: Service + 'static> LinkReceiver<S> {
         Ok(queue.len() - before)
     }
 
-    /// Advances the windows past samples without pending messages. Wakes the senders only when half of the credit is free, as
-    /// each wake-up is expensive.
+    /// Advances the windows past samples without pending messages. Wakes the senders only when half of the credit is
+    /// free, as each wake-up is expensive.
     fn release(&mut self) {
         let (counters, wire, depth) = (&self.end.counters, self.end.wire, self.end.depth as u64);
         while let Some(sample) = self.waiting.pop_front_if(|sample| sample.messages == 0) {
@@ -332,7 +333,8 @@ impl<S: Service + 'static> LinkReceiver<S> {
         }
     }
 
-    /// Records the owner's end mark. If the owner has not answered this reader's history request, it will repeat the mark.
+    /// Records the owner's end mark. If the owner has not answered this reader's history request, it will repeat the
+    /// mark.
     fn record_end_mark(&mut self, header: &SampleHeader) {
         let is_answered =
             self.history_request.is_some_and(|history_request| history_request <= header.message.sequence);
@@ -341,7 +343,8 @@ impl<S: Service + 'static> LinkReceiver<S> {
         }
     }
 
-    /// Whether the owner has ended the link. A reader that was restarted after that sees it only in the shared counters.
+    /// Whether the owner has ended the link. A reader that was restarted after that sees it only in the shared
+    /// counters.
     fn is_at_end(&self) -> bool {
         self.ended.is_some() || self.order == Order::Arrival && self.owner.counters.state() == StageState::Ended
     }

@@ -7,8 +7,8 @@ use std::rc::Rc;
 /// A repeated sample.
 pub(super) type Repeat = (SampleHeader, Rc<dyn Storage>);
 
-/// Repeated samples that are held back until the reader has received the earlier samples of their senders. Each sender has a
-/// queue of its own, so the owner's repetition can overtake the original samples.
+/// Repeated samples that are held back until the reader has received the earlier samples of their senders. Each sender
+/// has a queue of its own, so the owner's repetition can overtake the original samples.
 #[derive(Default)]
 pub(super) struct Repeats(Vec<Repeat>);
 
@@ -22,8 +22,9 @@ impl Repeats {
         self.0.is_empty()
     }
 
-    /// Removes and returns the repeated samples that are due before an original one. Those that the same sender is about to
-    /// deliver itself are dropped. None are due before a sample of another sender that was sent earlier than the repetition.
+    /// Removes and returns the repeated samples that are due before an original one. Those that the same sender is
+    /// about to deliver itself are dropped. None are due before a sample of another sender that was sent earlier than
+    /// the repetition.
     pub(super) fn before(&mut self, sample: &SampleHeader) -> Vec<Repeat> {
         let is_due = |(repeat, _): &Repeat| repeat.origin == sample.origin || repeat.sent_at < sample.sent_at;
         if !self.0.iter().any(is_due) {

@@ -13,8 +13,8 @@ const RECORD_ALIGNMENT: usize = 8;
 
 /// The user header of a sample.
 ///
-/// If `count` is 1, the payload is the bytes of `message`. Otherwise `message` is the header of the first message, and the
-/// payload contains for each message its header, its bytes, and zeros up to a multiple of 8 bytes.
+/// If `count` is 1, the payload is the bytes of `message`. Otherwise `message` is the header of the first message, and
+/// the payload contains for each message its header, its bytes, and zeros up to a multiple of 8 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
 #[type_name("gridweave_sample_header_3")]
 #[repr(C)]

@@ -132,7 +132,8 @@ impl<S: Service + 'static> LinkSender<S> {
         }) && self.has_memory()
     }
 
-    /// Whether the samples that a reader has not taken leave memory for another one. Live links have a few samples at most.
+    /// Whether the samples that a reader has not taken leave memory for another one. Live links have a few samples at
+    /// most.
     fn has_memory(&mut self) -> bool {
         if self.order == Order::LogTime && self.pending.is_full() {
             let (origin, number) = (self.origin, self.number);
@@ -250,8 +251,8 @@ impl<S: Service + 'static> LinkSender<S> {
         self.order == Order::LogTime && watermark > self.reached()
     }
 
-    /// Sends the end of the stream at the given log time; `answered_requests` is the number of history requests that the owner
-    /// has answered. Needs credit.
+    /// Sends the end of the stream at the given log time; `answered_requests` is the number of history requests that
+    /// the owner has answered. Needs credit.
     pub(crate) fn end(&mut self, time: LogTime, answered_requests: u64) -> Result<(), LinkError> {
         self.ended = Some(time);
         self.send_bytes(end_mark(time, answered_requests), &[])
@@ -326,7 +327,8 @@ impl<S: Service + 'static> LinkSender<S> {
         }
         let sample = self.publisher.loan_slice_uninit(length).map_err(|e| self.failed(&e))?;
         if let Some(shared_memory) = &self.shared_memory {
-            // The headers precede the payload, and iceoryx2 has written them already, into space that was checked to be free.
+            // The headers precede the payload, and iceoryx2 has written them already, into space that was checked to be
+            // free.
             let start = std::ptr::from_ref(sample.user_header()).addr();
             shared_memory.commit(start..sample.payload().as_ptr_range().end.addr(), doing)?;
         }
@@ -372,7 +374,8 @@ impl<S: Service + 'static> LinkSender<S> {
     }
 }
 
-/// The end mark of a stream. A live reader whose history request is not among the answered ones waits for the next mark.
+/// The end mark of a stream. A live reader whose history request is not among the answered ones waits for the next
+/// mark.
 fn end_mark(log_time: LogTime, answered_requests: u64) -> MessageHeader {
     MessageHeader { flags: MessageFlags::END, log_time, sequence: answered_requests, ..Default::default() }
 }

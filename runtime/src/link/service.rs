@@ -22,13 +22,13 @@ pub(super) const OBSERVER_BUFFER: usize = 64;
 pub(super) const HISTORY_BUFFER: usize = 128;
 /// The maximum number of samples that the owner of a live link borrows.
 pub(super) const HISTORY_BORROWED: usize = 22;
-/// The maximum number of topics in the history. Further topics are not repeated, with a warning. Every reader needs buffer
-/// space for the whole history, and that is memory reserved for the largest message of the link.
+/// The maximum number of topics in the history. Further topics are not repeated, with a warning. Every reader needs
+/// buffer space for the whole history, and that is memory reserved for the largest message of the link.
 pub(super) const MAX_TOPICS: usize = 40;
 /// The initial capacity of each sample, bytes of payload.
 pub(super) const INITIAL_CAPACITY: usize = 4 * 1024;
-/// The buffer of a reader of a live link beyond its depth: for the repeated history and end, for itself and for another late
-/// joiner at the same time.
+/// The buffer of a reader of a live link beyond its depth: for the repeated history and end, for itself and for another
+/// late joiner at the same time.
 const REPEAT_BUFFER: usize = 2 * (MAX_TOPICS + 1);
 /// The maximum number of attempts to open a link: on a busy machine, ends that open it concurrently may find it neither
 /// existing nor free to be created.
@@ -106,8 +106,8 @@ impl LinkShape<'_> {
         buffer = buffer.max(histories * HISTORY_BUFFER);
         let subscribers = self.readers.max(1) + observers + histories;
         let name = names.link(self.stage, self.port)?;
-        // The payload follows the user header, and so has its alignment. Requesting the alignment from iceoryx2 would cost
-        // eight bytes per sample.
+        // The payload follows the user header, and so has its alignment. Requesting the alignment from iceoryx2 would
+        // cost eight bytes per sample.
         let open = || {
             node.service_builder(&name)
                 .publish_subscribe::<[u8]>()
@@ -132,8 +132,8 @@ impl LinkShape<'_> {
         open().map_err(|e| failed(&e))
     }
 
-    /// Creates a publisher of the link. It reserves memory for every sample that can be in use at a time: the size of the
-    /// largest payload so far, rounded up to a power of two.
+    /// Creates a publisher of the link. It reserves memory for every sample that can be in use at a time: the size of
+    /// the largest payload so far, rounded up to a power of two.
     pub(super) fn publisher<S: Service>(
         &self,
         service: &PortFactory<S, [u8], SampleHeader>,

@@ -1,8 +1,8 @@
 //! Free space in the shared memory of the machine.
 //!
-//! Shared memory is reserved without being committed, and a write without free space kills the process with SIGBUS. Therefore
-//! the free space is checked before every write, with a margin for what iceoryx2 writes itself, and the memory of a sample is
-//! committed before the sample is written: another program may use up what was free.
+//! Shared memory is reserved without being committed, and a write without free space kills the process with SIGBUS.
+//! Therefore the free space is checked before every write, with a margin for what iceoryx2 writes itself, and the
+//! memory of a sample is committed before the sample is written: another program may use up what was free.
 
 use super::LinkError;
 use rustix::fs::statvfs;
@@ -36,7 +36,8 @@ struct Committed {
 }
 
 impl SharedMemory {
-    /// Checks that `bytes` bytes are free, unless a sample of that size is probably committed; `doing` describes the purpose.
+    /// Checks that `bytes` bytes are free, unless a sample of that size is probably committed; `doing` describes the
+    /// purpose.
     ///
     /// # Errors
     /// There is not enough space.
@@ -77,12 +78,12 @@ impl SharedMemory {
     }
 }
 
-/// One thread of this process at a time creates what iceoryx2 keeps in shared memory, and only where there is space for it: each
-/// thread would find the same free space otherwise.
+/// One thread of this process at a time creates what iceoryx2 keeps in shared memory, and only where there is space for
+/// it: each thread would find the same free space otherwise.
 static CREATION: Mutex<()> = Mutex::new(());
 
-/// Waits until nobody else creates anything, and checks that there is space; `doing` describes the purpose. The creation ends with
-/// the guard.
+/// Waits until nobody else creates anything, and checks that there is space; `doing` describes the purpose. The
+/// creation ends with the guard.
 ///
 /// # Errors
 /// There is not enough space.

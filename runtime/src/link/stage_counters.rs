@@ -169,8 +169,8 @@ impl StageCounters {
         self.counters.word(self.layout.senders(port)).fetch_add(1, Ordering::AcqRel);
     }
 
-    /// Requests the history of the stage's links, for a reader or an observer that has joined. Returns the number of the
-    /// request, counted from 1.
+    /// Requests the history of the stage's links, for a reader or an observer that has joined. Returns the number of
+    /// the request, counted from 1.
     pub(crate) fn request_history(&self) -> u64 {
         let before = self.stage_word(StageCounter::HistoryRequests as usize).fetch_add(1, Ordering::AcqRel);
         self.ring();
@@ -212,7 +212,8 @@ impl StageCounters {
         Window { origin: self.wire_word(wire, word), limit: self.wire_word(wire, word + 1) }
     }
 
-    /// The number of the first sample of the sender `origin` for which a wire has no credit; none while it is not connected.
+    /// The number of the first sample of the sender `origin` for which a wire has no credit; none while it is not
+    /// connected.
     pub(crate) fn limit_of(&self, wire: usize, origin: u64) -> Option<u64> {
         (0..MAX_SENDERS).find_map(|slot| self.window(wire, slot).limit_of(origin))
     }

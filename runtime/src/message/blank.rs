@@ -1,7 +1,7 @@
 //! Uninitialized memory of a message, and the proof that it was initialized.
 //!
-//! A sender lends the memory that its readers will see as a [`Blank`]. The writer returns a [`Filled`], which can only be
-//! obtained by writing all of a blank. So no byte is written twice, and none is sent uninitialized.
+//! A sender lends the memory that its readers will see as a [`Blank`]. The writer returns a [`Filled`], which can only
+//! be obtained by writing all of a blank. So no byte is written twice, and none is sent uninitialized.
 
 use crate::stage::StageError;
 use std::mem::MaybeUninit;

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 
 /// A channel of a log: the topic, the type and the schema of its messages.
 ///
-/// A source announces a channel on a link before its first message, so that a sink can write messages of types that this
-/// program does not know, with all the information of the input log.
+/// A source announces a channel on a link before its first message, so that a sink can write messages of types that
+/// this program does not know, with all the information of the input log.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Channel {
     /// The topic, as in the input.

@@ -39,8 +39,8 @@ impl Storage for Arc<Vec<u8>> {
 
 /// A message, borrowed from the memory that it was received in.
 ///
-/// Cloning it copies the header, but no payload. The memory is released to its sender when the last clone is dropped, so a
-/// stage may keep a map for as long as it needs it.
+/// Cloning it copies the header, but no payload. The memory is released to its sender when the last clone is dropped,
+/// so a stage may keep a map for as long as it needs it.
 #[derive(Clone)]
 pub struct Message {
     header: MessageHeader,

@@ -7,9 +7,9 @@ use super::{DEFAULT_DEPTH, Overflow, Pipeline, Restart, StageSpec, Wire};
 use crate::stage::{InputPort, OutputPort, StageKind};
 
 impl Pipeline {
-    /// Adds a stage in the process `process`. Each of its inputs is wired to all outputs of a matching type for which `takes`
-    /// returns true. Its outputs can only be read by stages that are attached later. Does nothing, and returns `false`, if a
-    /// required input would remain without a wire.
+    /// Adds a stage in the process `process`. Each of its inputs is wired to all outputs of a matching type for which
+    /// `takes` returns true. Its outputs can only be read by stages that are attached later. Does nothing, and returns
+    /// `false`, if a required input would remain without a wire.
     pub fn attach(
         &mut self,
         kind: &StageKind,

@@ -18,8 +18,8 @@ impl Location {
         Self { source, start: span.start, end: span.end.max(span.start) }
     }
 
-    /// The location of a part of the string value at this location; the whole value if it contains escapes, because then the
-    /// offsets differ.
+    /// The location of a part of the string value at this location; the whole value if it contains escapes, because
+    /// then the offsets differ.
     pub(super) fn part(&self, value: &str, part: Range<usize>) -> Self {
         let quoted = self.end - self.start == value.len() + 2;
         let inside = part.start < part.end && part.end <= value.len();
@@ -78,7 +78,8 @@ impl Diagnostic {
     }
 }
 
-/// The maximum number of errors that are shown. Each shows its line, and one line of a file can have any number of them.
+/// The maximum number of errors that are shown. Each shows its line, and one line of a file can have any number of
+/// them.
 pub(super) const MOST_SHOWN: usize = 100;
 
 /// The errors of a pipeline collected so far.
@@ -144,8 +145,8 @@ impl PipelineErrors {
         self.list.len()
     }
 
-    /// The errors as text: for each the problem, its line with the wrong part underlined, what was expected, and the most
-    /// similar valid name. `color` adds the escape codes of a terminal.
+    /// The errors as text: for each the problem, its line with the wrong part underlined, what was expected, and the
+    /// most similar valid name. `color` adds the escape codes of a terminal.
     pub fn render(&self, color: bool) -> String {
         let renderer = if color { Renderer::styled() } else { Renderer::plain() };
         let mut text = String::new();

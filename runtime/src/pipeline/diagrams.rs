@@ -8,8 +8,8 @@ use super::{Pipeline, StageSpec, Wire};
 use serde_json::Value;
 
 impl Pipeline {
-    /// A list of the stages in order: kind, inputs, and parameters that differ from their defaults. Lines are wrapped at
-    /// `width` characters where possible.
+    /// A list of the stages in order: kind, inputs, and parameters that differ from their defaults. Lines are wrapped
+    /// at `width` characters where possible.
     pub fn to_text(&self, width: usize) -> String {
         let count = match self.stages.len() {
             1 => "1 stage".to_owned(),

@@ -2,8 +2,8 @@
 
 use super::suggest;
 
-/// The indexes of the links, given as (stage, output), that match a name: `STAGE.PORT`, or `STAGE` for all outputs of the stage.
-/// Errors call the run `run`.
+/// The indexes of the links, given as (stage, output), that match a name: `STAGE.PORT`, or `STAGE` for all outputs of
+/// the stage. Errors call the run `run`.
 ///
 /// # Errors
 /// No link matches; the text suggests a similar name, or lists all.

@@ -34,8 +34,8 @@
 //! inputs = { in = ["log.*", "lines"] }    # by port; `*` means all outputs
 //! ```
 //!
-//! A pipeline with `mode = "live"` in `[pipeline]` handles messages as they arrive, until the user ends it. Its stages have
-//! more settings:
+//! A pipeline with `mode = "live"` in `[pipeline]` handles messages as they arrive, until the user ends it. Its stages
+//! have more settings:
 //!
 //! ```toml
 //! [stages.robots]
@@ -49,8 +49,8 @@
 //! restart = "on_failure"                  # restart it when it fails; the default "never" ends the run
 //! ```
 //!
-//! In a list of inputs each entry feeds the first free input port of exactly its type or, if there is none, of any type.
-//! [`Pipeline::load`] checks the whole file and reports all errors at once.
+//! In a list of inputs each entry feeds the first free input port of exactly its type or, if there is none, of any
+//! type. [`Pipeline::load`] checks the whole file and reports all errors at once.
 
 mod attach;
 mod binding;
@@ -96,27 +96,28 @@ pub use text_layout::{TEXT_WIDTH, wrap_words};
 use crate::stage::{Context, InitialPoses, InputWire, RobotTopics, StageKind};
 use std::time::Duration;
 
-/// A valid pipeline: the kind of each stage exists, the two ends of each wire exist and have the same type, and there is no
-/// cycle.
+/// A valid pipeline: the kind of each stage exists, the two ends of each wire exist and have the same type, and there
+/// is no cycle.
 #[derive(Clone, Debug)]
 pub struct Pipeline {
     /// The name of the pipeline.
     pub name: String,
     /// Whether it replays logs or runs live.
     pub mode: Mode,
-    /// The robot whose map frame is the world; if none, the first by name at the time when the first two maps are merged.
+    /// The robot whose map frame is the world; if none, the first by name at the time when the first two maps are
+    /// merged.
     pub reference: Option<String>,
     /// The seed of all randomness.
     pub seed: u64,
     /// Whether small messages are sent in batches. This saves wake-ups; without it each message is sent at once.
     pub batch: bool,
-    /// The maximum time of a stage for one message; none if unlimited. A stage that exceeds it hangs, which ends the run. Only
-    /// on the engine `processes`, because a thread cannot be killed.
+    /// The maximum time of a stage for one message; none if unlimited. A stage that exceeds it hangs, which ends the
+    /// run. Only on the engine `processes`, because a thread cannot be killed.
     pub stall_timeout: Option<Duration>,
     /// The maximum private memory of each process on the engine `processes`, bytes; none if unlimited.
     pub memory_limit: Option<u64>,
-    /// The maximum memory of an input's pending messages that all have the same log time, bytes. Where an earlier input may
-    /// still bring a message of that time, all of them wait, however small the depth.
+    /// The maximum memory of an input's pending messages that all have the same log time, bytes. Where an earlier input
+    /// may still bring a message of that time, all of them wait, however small the depth.
     pub same_time_limit: u64,
     /// The topic patterns of the robots.
     pub robots: RobotTopics,
@@ -135,8 +136,8 @@ pub struct StageSpec {
     pub kind: StageKind,
     /// The given parameters.
     pub parameters: toml::Table,
-    /// Its inputs, by input port and, within a port, in the order of the file. The index in this list breaks ties between
-    /// messages with the same log time.
+    /// Its inputs, by input port and, within a port, in the order of the file. The index in this list breaks ties
+    /// between messages with the same log time.
     pub inputs: Vec<Wire>,
     /// The topic of each output port's messages in a log, with `{robot}` for the robot's name.
     pub topics: Vec<String>,
@@ -144,8 +145,8 @@ pub struct StageSpec {
     pub depth: usize,
     /// The process that it runs in, on the engine `processes`. Stages with the same one share it.
     pub process: String,
-    /// What each output port does with a message for which a reader has granted no credit. Only for a live pipeline: a replay
-    /// waits.
+    /// What each output port does with a message for which a reader has granted no credit. Only for a live pipeline: a
+    /// replay waits.
     pub overflow: Vec<Overflow>,
     /// What happens when the stage fails. Only for a live pipeline.
     pub restart: Restart,
@@ -211,8 +212,8 @@ impl Pipeline {
     }
 }
 
-/// The seed of a stage: FNV-1a over the pipeline's seed and the stage's name, so that adding a stage does not change the seeds
-/// of others.
+/// The seed of a stage: FNV-1a over the pipeline's seed and the stage's name, so that adding a stage does not change
+/// the seeds of others.
 fn stage_seed(seed: u64, name: &str) -> u64 {
     let bytes = seed.to_le_bytes().into_iter().chain(name.bytes());
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))

@@ -6,8 +6,8 @@ use petgraph::graph::{DiGraph, NodeIndex};
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-/// Sorts the stages 0 to `count` topologically, such that each comes after those that feed it; ties are broken by index.
-/// `edges` go from a stage to its readers.
+/// Sorts the stages 0 to `count` topologically, such that each comes after those that feed it; ties are broken by
+/// index. `edges` go from a stage to its readers.
 ///
 /// # Errors
 /// There are cycles: the shortest one of each strongly connected component, starting with its least stage, which is not

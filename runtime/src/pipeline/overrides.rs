@@ -76,8 +76,8 @@ impl Overrides {
         Ok(())
     }
 
-    /// Sets a parameter of the only stage of a kind, such as the files of the only source of logs. Loading the pipeline fails if
-    /// there is no such stage, or more than one.
+    /// Sets a parameter of the only stage of a kind, such as the files of the only source of logs. Loading the pipeline
+    /// fails if there is no such stage, or more than one.
     pub fn set_for_kind(&mut self, kind: &str, parameter: &str, value: impl Into<toml::Value>) {
         let stage = Target::OnlyOfKind(kind.to_owned());
         self.push(stage, parameter, parameter, &value.into().to_string());

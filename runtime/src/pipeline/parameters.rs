@@ -42,7 +42,8 @@ pub(super) fn read_parameters(
     table
 }
 
-/// The diagnostic of an invalid value: `what` is its title, the first line of the error its label, and further lines a note.
+/// The diagnostic of an invalid value: `what` is its title, the first line of the error its label, and further lines a
+/// note.
 pub(super) fn out_of_range(error: &ParameterError, given: &[&Entry], stage_at: &Location, what: &str) -> Diagnostic {
     let title = format!("`{}` {what}", error.field);
     let (problem, more) = error.problem.split_once('\n').unwrap_or((&error.problem, ""));

@@ -20,8 +20,8 @@ pub const MAX_DEPTH: usize = 4096;
 /// The default for the maximum time of a stage for one message.
 const DEFAULT_STALL_TIMEOUT: Duration = Duration::from_secs(300);
 
-/// The default for the maximum memory of an input's pending messages of one log time, bytes: more than the content that a log
-/// may have at one time.
+/// The default for the maximum memory of an input's pending messages of one log time, bytes: more than the content that
+/// a log may have at one time.
 pub const DEFAULT_SAME_TIME_LIMIT: u64 = 2 << 30;
 
 /// The settings of `[pipeline]` and `[robots]`.

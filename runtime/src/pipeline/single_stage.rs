@@ -22,7 +22,8 @@ pub struct SingleStage {
     pub topics: Vec<String>,
     /// The samples that each input can queue before the sender waits.
     pub depth: usize,
-    /// The robot whose map frame is the world; if none, the first by name at the time when the first two maps are merged.
+    /// The robot whose map frame is the world; if none, the first by name at the time when the first two maps are
+    /// merged.
     pub reference: Option<String>,
     /// The seed of all randomness.
     pub seed: u64,
@@ -35,8 +36,8 @@ pub struct SingleStage {
 }
 
 impl SingleStage {
-    /// Reads the sections `[stage]`, `[pipeline]` and `[robots]` of a TOML text; errors call it `source_name`. Sections whose
-    /// names are in `others` are ignored, and any other is an error.
+    /// Reads the sections `[stage]`, `[pipeline]` and `[robots]` of a TOML text; errors call it `source_name`. Sections
+    /// whose names are in `others` are ignored, and any other is an error.
     ///
     /// # Errors
     ///

@@ -14,8 +14,8 @@ const LEAST_COLUMN: usize = 24;
 /// A word that is longer than a line is broken behind one of these: those of topics, type names, paths and lists.
 const JOINTS: [char; 6] = ['/', '_', '-', ',', '.', '='];
 
-/// Wraps text to lines of at most `width` columns, at spaces; line ends in it count as spaces. A word that is longer than a line
-/// is broken behind the last joint that fits, or at the end of the line.
+/// Wraps text to lines of at most `width` columns, at spaces; line ends in it count as spaces. A word that is longer
+/// than a line is broken behind the last joint that fits, or at the end of the line.
 pub fn wrap_words(text: &str, width: usize) -> Vec<String> {
     let width = width.max(1);
     let words = text.split_whitespace().map(|word| Word { whitespace: " ", ..Word::from(word) });
@@ -63,8 +63,8 @@ pub(super) fn push_filled(page: &mut String, indent: usize, width: usize, text: 
     }
 }
 
-/// Appends a table whose columns are as wide as their widest cells. The last column is wrapped at `width`, next to the others
-/// or, with too little space, below them.
+/// Appends a table whose columns are as wide as their widest cells. The last column is wrapped at `width`, next to the
+/// others or, with too little space, below them.
 pub(super) fn push_table<const N: usize>(page: &mut String, indent: usize, width: usize, rows: &[[String; N]]) {
     let widest = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or_default();
     let widths: [usize; N] = std::array::from_fn(widest);

@@ -6,8 +6,8 @@ use crate::stage::{InitialPose, InitialPoses, RobotTopics, TagFields};
 use toml::{Table, Value};
 
 impl Pipeline {
-    /// The text of a pipeline file that loads as the same pipeline without any overrides: for passing it to another process, or
-    /// storing it with the results.
+    /// The text of a pipeline file that loads as the same pipeline without any overrides: for passing it to another
+    /// process, or storing it with the results.
     pub fn to_toml(&self) -> String {
         let seed = i64::try_from(self.seed).map_or_else(|_| Value::from(self.seed.to_string()), Value::from);
         let mut pipeline = Table::from_iter([

@@ -21,7 +21,8 @@ pub const CREDITS: usize = 16;
 const MAX_BORROWED: usize = 32;
 /// The time that a program has to end a call after its stage has failed.
 const END_TIME: Duration = Duration::from_secs(5);
-/// The maximum time by which a call times out before the engine kills the stage, so that the program can report where it hangs.
+/// The maximum time by which a call times out before the engine kills the stage, so that the program can report where
+/// it hangs.
 const REPORT_MARGIN: Duration = Duration::from_secs(2);
 /// The initial capacity of each sample, bytes of payload.
 const INITIAL_CAPACITY: usize = 4 * 1024;
@@ -108,8 +109,8 @@ impl Program {
         }
     }
 
-    /// Calls the program, and passes its outputs and warnings to `take` until `take` fails. After any other failure all later
-    /// calls do nothing.
+    /// Calls the program, and passes its outputs and warnings to `take` until `take` fails. After any other failure all
+    /// later calls do nothing.
     pub(super) fn call(
         &mut self,
         what: Request,
@@ -148,7 +149,8 @@ impl Program {
         mut take: impl FnMut(Reply, &CallHeader, &[u8]) -> Result<(), StageError>,
     ) -> Result<(), CallError> {
         let Some(ports) = &self.ports else { return Ok(()) };
-        // An output that cannot be forwarded ends the run. The program still completes its call, so that it can be aborted.
+        // An output that cannot be forwarded ends the run. The program still completes its call, so that it can be
+        // aborted.
         let mut refused: Option<StageError> = None;
         loop {
             let longest = match refused {

@@ -20,8 +20,9 @@ use std::collections::BTreeMap;
 /// assert_eq!(Interface::read(text).unwrap().inputs[0].name, "map");
 /// ```
 ///
-/// An input may have `many` or `optional`, an output `topic` or `side`; see [`InputPort`] and [`OutputPort`]. The parameters are a
-/// JSON schema. `definitions` contains the definitions of custom types of ports in the format `ros2msg`, by name.
+/// An input may have `many` or `optional`, an output `topic` or `side`; see [`InputPort`] and [`OutputPort`]. The
+/// parameters are a JSON schema. `definitions` contains the definitions of custom types of ports in the format
+/// `ros2msg`, by name.
 #[derive(Clone, Debug)]
 pub struct Interface {
     /// What the stage does.

@@ -16,8 +16,8 @@ struct Given(Map<String, Value>);
 
 impl Parameters for Given {}
 
-/// The stage kind `name` with the ports and parameters of `interface`, whose program `launch` starts. Errors call the program
-/// `what`. The kind is never freed.
+/// The stage kind `name` with the ports and parameters of `interface`, whose program `launch` starts. Errors call the
+/// program `what`. The kind is never freed.
 pub fn kind_of(name: &'static str, what: &str, interface: Interface, launch: Launch) -> &'static StageKind {
     let Interface { summary, inputs, outputs, parameters, definitions, text } = interface;
     let names: Vec<&'static str> = inputs.iter().map(|port| port.name).collect();

@@ -12,8 +12,8 @@ use std::time::{Duration, Instant};
 
 /// The timeout of a single wait.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
-/// The maximum time that a single wait counts: a wait that took longer means that this process was suspended, and probably its
-/// program too.
+/// The maximum time that a single wait counts: a wait that took longer means that this process was suspended, and
+/// probably its program too.
 const MAX_COUNTED_WAIT: Duration = Duration::from_secs(1);
 /// The time that a program has to exit after its standard input is closed.
 const EXIT_TIME: Duration = Duration::from_secs(5);
@@ -70,7 +70,8 @@ impl Process {
         }
     }
 
-    /// Rings the doorbell of the program. A failure is ignored: the end of the program is noticed by [`wait`](Self::wait).
+    /// Rings the doorbell of the program. A failure is ignored: the end of the program is noticed by
+    /// [`wait`](Self::wait).
     pub(super) fn ring(&mut self, byte: u8) {
         let _ = self.input.as_mut().map(|input| input.write_all(&[byte]));
     }

@@ -1,7 +1,7 @@
 //! The meaning of an occupancy grid's cell values: -1 unknown, 0 free to 100 occupied.
 //!
-//! The thresholds are those of nav2's map server, 65 % and 25 %. A value between them is known, but neither occupied nor free;
-//! any other value counts as unknown.
+//! The thresholds are those of nav2's map server, 65 % and 25 %. A value between them is known, but neither occupied
+//! nor free; any other value counts as unknown.
 
 /// The value of an unobserved cell.
 pub const UNKNOWN: i8 = -1;

@@ -29,7 +29,8 @@ pub struct MapDeformation {
     pub robot: String,
     /// The distance between nodes along x and along y, metres.
     pub spacing: f64,
-    /// The nodes, on a lattice through the origin of the map frame, row by row. The displacement is interpolated bilinearly.
+    /// The nodes, on a lattice through the origin of the map frame, row by row. The displacement is interpolated
+    /// bilinearly.
     pub nodes: Vec<DeformationNode>,
     /// The length of its walls that were matched with walls of other maps, metres.
     pub wall_matched: f64,
@@ -37,10 +38,11 @@ pub struct MapDeformation {
     pub sharpness_rigid: Sharpness,
     /// The sharpness of the matched walls with the deformations.
     pub sharpness: Sharpness,
-    /// The estimated deformation: standard deviation of the relative displacement of two points, metres per square root of the
-    /// distance in metres; 0 if unknown.
+    /// The estimated deformation: standard deviation of the relative displacement of two points, metres per square root
+    /// of the distance in metres; 0 if unknown.
     pub bend: f64,
-    /// The standard deviation of the relative rotation of two points, radians per square root of the distance in metres.
+    /// The standard deviation of the relative rotation of two points, radians per square root of the distance in
+    /// metres.
     pub turn: f64,
 }
 

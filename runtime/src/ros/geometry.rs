@@ -44,8 +44,9 @@ impl Quaternion {
         Self { x: 0.0, y: 0.0, z: (yaw / 2.0).sin(), w: (yaw / 2.0).cos() }
     }
 
-    /// The rotation about the vertical axis, radians in `(-pi, pi]`, whatever the norm. It is 0 for four zeros, which many programs
-    /// write for "no rotation", and not a number for others whose norm is too small or too large to be computed.
+    /// The rotation about the vertical axis, radians in `(-pi, pi]`, whatever the norm. It is 0 for four zeros, which
+    /// many programs write for "no rotation", and not a number for others whose norm is too small or too large to be
+    /// computed.
     pub fn yaw(&self) -> f64 {
         let Self { x, y, z, w } = *self;
         if !(w * w + x * x + y * y + z * z).is_normal() && [x, y, z, w] != [0.0; 4] {

@@ -87,8 +87,8 @@ pub struct Alignment {
     pub a: String,
     /// The robot of map b, which is moved.
     pub b: String,
-    /// The source of the hypothesis, such as `tags` or `maps`. An alignment of a pair replaces the previous one of the same
-    /// source; those of different sources compete.
+    /// The source of the hypothesis, such as `tags` or `maps`. An alignment of a pair replaces the previous one of the
+    /// same source; those of different sources compete.
     pub source: String,
     /// Whether there is a transform. If not, the transform and its covariance are meaningless.
     pub has_transform: bool,
@@ -100,22 +100,23 @@ pub struct Alignment {
     pub yaw: f64,
     /// Covariance of (x, y, yaw), 3 x 3, metres and radians.
     pub covariance: [f64; 9],
-    /// The agreement of the maps, 0 to 1, as estimated by the sending stage. A stage that has searched all hypotheses gives
-    /// the significance of this one: the probability that it is not the best by chance.
+    /// The agreement of the maps, 0 to 1, as estimated by the sending stage. A stage that has searched all hypotheses
+    /// gives the significance of this one: the probability that it is not the best by chance.
     pub score: f64,
-    /// By how much the maps fit better here than by chance, as a share of how well they fit, 0 to 1. 0 if its stage does not know.
+    /// By how much the maps fit better here than by chance, as a share of how well they fit, 0 to 1. 0 if its stage
+    /// does not know.
     pub margin: f64,
     /// The steps by which it was found, as in `tags+directions+icp`; for people.
     pub method: String,
     /// Whether it may be used to merge the maps.
     pub accepted: bool,
-    /// Whether it may be used only after the walls of the maps have confirmed it, because its evidence is insufficient. The
-    /// stage that confirms it sends it without this flag.
+    /// Whether it may be used only after the walls of the maps have confirmed it, because its evidence is insufficient.
+    /// The stage that confirms it sends it without this flag.
     pub provisional: bool,
     /// The rank among the hypotheses of its stage for the pair: 0 for the best.
     pub rank: u32,
-    /// The number of hypotheses of its stage for the pair. All are sent one after the other, by rank, and replace those sent
-    /// before. 0 if its stage does not search for others, 1 if it has searched and found no other.
+    /// The number of hypotheses of its stage for the pair. All are sent one after the other, by rank, and replace those
+    /// sent before. 0 if its stage does not search for others, 1 if it has searched and found no other.
     pub hypotheses: u32,
     /// Why it is rejected, or its evidence: a few short lines for everybody and, after an empty line, the details.
     pub reason: String,
@@ -195,9 +196,11 @@ pub struct RobotFrames {
 pub struct RobotGroup {
     /// The robot of the group in whose map frame the others are placed.
     pub reference: String,
-    /// The frame of the group: `world/REFERENCE`, the map frame of its reference. It is not connected to the frame `world`.
+    /// The frame of the group: `world/REFERENCE`, the map frame of its reference. It is not connected to the frame
+    /// `world`.
     pub frame_id: String,
-    /// The robots of the group, including its reference, by name. Their poses are in the map frame of the group's reference.
+    /// The robots of the group, including its reference, by name. Their poses are in the map frame of the group's
+    /// reference.
     pub frames: Vec<RobotFrame>,
 }
 

@@ -18,8 +18,8 @@ pub struct IcpErrors {
     pub rank: u32,
     /// Whether the result may be used.
     pub accepted: bool,
-    /// The weighted root mean square distance of the matched walls before each iteration, metres. The first iterations match a
-    /// sample of the points, with a larger maximum distance.
+    /// The weighted root mean square distance of the matched walls before each iteration, metres. The first iterations
+    /// match a sample of the points, with a larger maximum distance.
     pub errors: Vec<f64>,
 }
 

@@ -1,7 +1,7 @@
 //! The ROS 2 messages that stages exchange, and their encoding (CDR).
 //!
-//! The types mirror the `.msg` files field by field. Units are SI, angles are in radians, and the header names the frame.
-//! [`OccupancyGrid`] borrows its cells; the other types are small and own their data.
+//! The types mirror the `.msg` files field by field. Units are SI, angles are in radians, and the header names the
+//! frame. [`OccupancyGrid`] borrows its cells; the other types are small and own their data.
 
 pub mod cell;
 mod codec;

@@ -50,9 +50,9 @@ impl<P: Parameters, S: 'static, O: 'static> StageBuilder<P, S, O> {
 
     /// Adds an input that must be wired to one output.
     ///
-    /// The messages of all inputs are delivered together in order of log time; at equal times in the order of the kind's input
-    /// ports (within a port with several wires in the order of the pipeline file), and within one wire as they were sent. A
-    /// message that cannot be decoded is skipped with a warning.
+    /// The messages of all inputs are delivered together in order of log time; at equal times in the order of the
+    /// kind's input ports (within a port with several wires in the order of the pipeline file), and within one wire as
+    /// they were sent. A message that cannot be decoded is skipped with a warning.
     #[must_use]
     pub fn input<T: RosMessage + 'static>(
         self,
@@ -125,8 +125,8 @@ impl<P: Parameters, S: 'static, O: 'static> StageBuilder<P, S, O> {
         self
     }
 
-    /// Sets the handler for a channel that a source announces: the messages with its number that follow on the wire were
-    /// logged on it. Only needed by a stage that forwards messages of unknown types.
+    /// Sets the handler for a channel that a source announces: the messages with its number that follow on the wire
+    /// were logged on it. Only needed by a stage that forwards messages of unknown types.
     #[must_use]
     pub fn announce(
         mut self,
@@ -146,8 +146,8 @@ impl<P: Parameters, S: 'static, O: 'static> StageBuilder<P, S, O> {
         self
     }
 
-    /// Sets the handler for a failure of the run elsewhere. It should leave output files usable, with the reason why they are
-    /// not complete.
+    /// Sets the handler for a failure of the run elsewhere. It should leave output files usable, with the reason why
+    /// they are not complete.
     #[must_use]
     pub fn abort(mut self, abort: impl Fn(&mut S, &str) + Send + Sync + 'static) -> Self {
         self.handlers.abort = Box::new(abort);

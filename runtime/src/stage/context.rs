@@ -12,7 +12,8 @@ pub struct Context {
     pub stage: String,
     /// The seed of the stage's randomness, derived from the pipeline's seed and the stage's name.
     pub seed: u64,
-    /// The robot whose map frame is the world; if none, the first by name at the time when the first two maps are merged.
+    /// The robot whose map frame is the world; if none, the first by name at the time when the first two maps are
+    /// merged.
     pub reference: Option<String>,
     /// The topic patterns of the robots.
     pub robots: RobotTopics,
@@ -48,8 +49,8 @@ pub struct InputWire {
     pub ros_type: String,
     /// The definition of that type in the format `ros2msg`; empty for types that Gridweave knows.
     pub definition: String,
-    /// The topic of its messages in a log, with `{robot}` for the robot's name; empty if each message has its own topic, like
-    /// those of a source.
+    /// The topic of its messages in a log, with `{robot}` for the robot's name; empty if each message has its own
+    /// topic, like those of a source.
     pub topic: String,
 }
 
@@ -104,9 +105,9 @@ pub fn match_robot<'a>(pattern: &str, text: &'a str) -> Option<&'a str> {
     (!robot.is_empty() && !robot.contains('/')).then_some(robot)
 }
 
-/// The name of a robot's frame in the tf tree of all robots: the frame `map` of `robot1` becomes `robot1/map`. A frame that
-/// starts with the robot's name already, such as `robot1/map` or `robot1_map`, is unchanged. The leading slash of ROS 1 is
-/// removed.
+/// The name of a robot's frame in the tf tree of all robots: the frame `map` of `robot1` becomes `robot1/map`. A frame
+/// that starts with the robot's name already, such as `robot1/map` or `robot1_map`, is unchanged. The leading slash of
+/// ROS 1 is removed.
 ///
 /// Without a robot, and for a frame without a name, no prefix is added.
 pub fn frame_of_robot<'a>(robot: &str, frame: &'a str) -> Cow<'a, str> {

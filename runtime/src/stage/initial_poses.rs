@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Where the user knows the map frame of one robot to lie, in a frame that all initial poses have in common: for a robot
-/// whose map begins where it stood, the place where it stood.
+/// Where the user knows the map frame of one robot to lie, in a frame that all initial poses have in common: for a
+/// robot whose map begins where it stood, the place where it stood.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InitialPose {
     /// Metres.

@@ -9,8 +9,8 @@ use schemars::Schema;
 use serde::de::Error;
 use serde_json::Value;
 
-/// Checks parameters, all of which are optional, and returns every value that is out of its range. A parameter that is not in
-/// the schema is ignored.
+/// Checks parameters, all of which are optional, and returns every value that is out of its range. A parameter that is
+/// not in the schema is ignored.
 ///
 /// # Errors
 /// A parameter does not have the type of its schema.

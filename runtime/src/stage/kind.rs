@@ -55,11 +55,12 @@ pub trait Source: 'static {
     /// Its output ports.
     type Outputs: Outputs;
 
-    /// Sends the next message or the next few, in order of log time over all ports. Returns `false` when there are no more.
+    /// Sends the next message or the next few, in order of log time over all ports. Returns `false` when there are no
+    /// more.
     fn next(&mut self, output: &Output<Self::Outputs>) -> Result<bool, StageError>;
 
-    /// Waits until there is something to send, for at most `longest`; for sources whose messages come from outside of the run.
-    /// Called before each [`next`](Self::next) in a live run. It does not count as working time.
+    /// Waits until there is something to send, for at most `longest`; for sources whose messages come from outside of
+    /// the run. Called before each [`next`](Self::next) in a live run. It does not count as working time.
     fn wait(&mut self, _longest: Duration) {}
 
     /// Sends what the source still holds. Called once, when a live run is asked to end.
@@ -80,8 +81,8 @@ pub trait Source: 'static {
 }
 
 impl StageKind {
-    /// A builder of a stage kind with parameters `P`, state `S` and outputs `O`. `make` creates the state from the parameters;
-    /// inputs and their handlers are added to the builder.
+    /// A builder of a stage kind with parameters `P`, state `S` and outputs `O`. `make` creates the state from the
+    /// parameters; inputs and their handlers are added to the builder.
     pub fn stage<P, S, O>(
         name: &'static str,
         summary: &'static str,
@@ -186,8 +187,9 @@ impl StageKind {
         }
     }
 
-    /// A kind whose stages differ in ports and parameters, which only the program behind each of them knows: `ask` finds them
-    /// out from the parameters that are given and the folder that paths among them begin at. `P` are those that all have.
+    /// A kind whose stages differ in ports and parameters, which only the program behind each of them knows: `ask`
+    /// finds them out from the parameters that are given and the folder that paths among them begin at. `P` are those
+    /// that all have.
     pub fn dynamic<P: Parameters>(
         name: &'static str,
         summary: &'static str,
@@ -221,8 +223,8 @@ impl StageKind {
         self.resolve.is_some()
     }
 
-    /// What the stage with the given parameters is, where each has ports and parameters of its own; paths among them begin at
-    /// `folder`. None for every other kind.
+    /// What the stage with the given parameters is, where each has ports and parameters of its own; paths among them
+    /// begin at `folder`. None for every other kind.
     ///
     /// # Errors
     /// The parameters do not lead to a stage.
@@ -237,8 +239,8 @@ impl StageKind {
         Self { schema, check: Arc::new(move |table| json_schema::check(&described, table)), ..self }
     }
 
-    /// The same kind with the definitions of the custom message types of its ports: texts in the format `ros2msg`, by name, as
-    /// log formats store them.
+    /// The same kind with the definitions of the custom message types of its ports: texts in the format `ros2msg`, by
+    /// name, as log formats store them.
     #[must_use]
     pub fn with_definitions(self, definitions: BTreeMap<String, String>) -> Self {
         Self { definitions, ..self }
@@ -287,7 +289,8 @@ impl StageKind {
         (self.check)(table)
     }
 
-    /// Creates a stage of this kind. Its output ports are connected to `ends` in order; further ports are not connected.
+    /// Creates a stage of this kind. Its output ports are connected to `ends` in order; further ports are not
+    /// connected.
     ///
     /// # Errors
     /// The parameters are wrong, or the stage cannot be created.

@@ -38,9 +38,9 @@
 //! # assert_eq!(sent[0].pose.position.x, 4.5);
 //! ```
 //!
-//! A stage has no state outside of its struct and uses nothing else: no clock, no global, and no randomness except what is
-//! seeded from [`Context::seed`]. A message that it sends carries the log time of the message that caused it. Therefore the
-//! same inputs give the same outputs on every engine.
+//! A stage has no state outside of its struct and uses nothing else: no clock, no global, and no randomness except what
+//! is seeded from [`Context::seed`]. A message that it sends carries the log time of the message that caused it.
+//! Therefore the same inputs give the same outputs on every engine.
 
 mod builder;
 mod context;

@@ -87,13 +87,14 @@ impl OutputPorts {
         Self { ends: ends.into_iter(), ..Self::default() }
     }
 
-    /// Declares an output whose messages have the topic `/{robot}/{stage}/{name}` or, if they are about no robot in particular,
-    /// `/{stage}/{name}`.
+    /// Declares an output whose messages have the topic `/{robot}/{stage}/{name}` or, if they are about no robot in
+    /// particular, `/{stage}/{name}`.
     pub fn output<T: RosMessage>(&mut self, name: &'static str, summary: &'static str) -> Out<T> {
         self.add(OutputPort { name, port_type: PortType::of::<T>(), topic: None, side: false, summary })
     }
 
-    /// Declares an output whose messages have the given topic, in which `{robot}` and `{stage}` are replaced by the names.
+    /// Declares an output whose messages have the given topic, in which `{robot}` and `{stage}` are replaced by the
+    /// names.
     pub fn output_on<T: RosMessage>(
         &mut self,
         topic: &'static str,
@@ -103,8 +104,8 @@ impl OutputPorts {
         self.add(OutputPort { name, port_type: PortType::of::<T>(), topic: Some(topic), side: false, summary })
     }
 
-    /// Declares a side output, for diagnostics and other secondary messages: like [`output`](Self::output), but never the
-    /// output that is meant where a pipeline names only the stage.
+    /// Declares a side output, for diagnostics and other secondary messages: like [`output`](Self::output), but never
+    /// the output that is meant where a pipeline names only the stage.
     pub fn side_output<T: RosMessage>(&mut self, name: &'static str, summary: &'static str) -> Out<T> {
         self.add(OutputPort { name, port_type: PortType::of::<T>(), topic: None, side: true, summary })
     }
@@ -193,7 +194,8 @@ impl SentCounts {
     }
 }
 
-/// The outputs `O` of a stage while it handles a message, with their shared log time, warnings and counts. Dereferences to `O`.
+/// The outputs `O` of a stage while it handles a message, with their shared log time, warnings and counts. Dereferences
+/// to `O`.
 pub struct Output<O> {
     outputs: O,
     state: Rc<OutputState>,
@@ -218,8 +220,8 @@ impl<O> Output<O> {
         self.state.log_time.set(log_time);
     }
 
-    /// Counts a warning: a problem with the input that the stage can continue with, such as "readings before the first pose".
-    /// The summary of the run shows every text with its count.
+    /// Counts a warning: a problem with the input that the stage can continue with, such as "readings before the first
+    /// pose". The summary of the run shows every text with its count.
     pub fn warn(&self, what: impl Into<String>) {
         *self.state.warnings.borrow_mut().entry(what.into()).or_default() += 1;
     }
@@ -253,8 +255,8 @@ impl<T: RosMessage> Out<T> {
 }
 
 impl Out<OccupancyGrid<'static>> {
-    /// Sends a grid about `robot`, whose cells `fill` writes directly to the memory that the readers see. `fill` is not called
-    /// if the port has no readers.
+    /// Sends a grid about `robot`, whose cells `fill` writes directly to the memory that the readers see. `fill` is not
+    /// called if the port has no readers.
     ///
     /// # Errors
     /// The grid is too large for the message, the robot's name too long, `fill` fails, or the link has failed.

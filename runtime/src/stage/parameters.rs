@@ -23,9 +23,10 @@ impl ParameterError {
 }
 
 /// The parameters of a stage kind: a struct with `#[serde(default, deny_unknown_fields)]`, whose doc comments are the
-/// reference that `gridweave kinds` prints; or `()` for none. Lengths are in metres, angles in radians, times in seconds. The
-/// range of a field is an attribute: `#[schemars(range(min = 0.0, max = 1.0))]`, or
-/// `#[schemars(extend("exclusiveMinimum" = 0.0))]` if the limit itself is not allowed. Without a range, a number must be finite.
+/// reference that `gridweave kinds` prints; or `()` for none. Lengths are in metres, angles in radians, times in
+/// seconds. The range of a field is an attribute: `#[schemars(range(min = 0.0, max = 1.0))]`, or
+/// `#[schemars(extend("exclusiveMinimum" = 0.0))]` if the limit itself is not allowed. Without a range, a number must
+/// be finite.
 pub trait Parameters: Serialize + DeserializeOwned + JsonSchema + Default + 'static {
     /// Errors that involve several parameters, such as a minimum above the maximum.
     fn check_together(&self) -> Vec<ParameterError> {

@@ -58,10 +58,11 @@ pub struct OutputPort {
     pub name: &'static str,
     /// The type of its messages.
     pub port_type: PortType,
-    /// The topic of its messages in a log, in which `{robot}` and `{stage}` are replaced; if none, `/{robot}/{stage}/{port}` or,
-    /// for messages about no robot in particular, `/{stage}/{port}`.
+    /// The topic of its messages in a log, in which `{robot}` and `{stage}` are replaced; if none,
+    /// `/{robot}/{stage}/{port}` or, for messages about no robot in particular, `/{stage}/{port}`.
     pub topic: Option<&'static str>,
-    /// Whether it is a side output: where a pipeline names only a stage, its only output that is not a side output is meant.
+    /// Whether it is a side output: where a pipeline names only a stage, its only output that is not a side output is
+    /// meant.
     pub side: bool,
     /// A description of its messages.
     pub summary: &'static str,

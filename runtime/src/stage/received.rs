@@ -4,8 +4,8 @@ use crate::message::{LogTime, Message};
 use crate::ros::RosMessage;
 use std::ops::Deref;
 
-/// A message received on a port of type `T`, decoded. It dereferences to its content, which borrows what it can, such as the
-/// cells of a map, from the memory of the message.
+/// A message received on a port of type `T`, decoded. It dereferences to its content, which borrows what it can, such
+/// as the cells of a map, from the memory of the message.
 pub struct Received<'a, T: RosMessage> {
     message: &'a Message,
     content: T::Borrowed<'a>,

@@ -18,7 +18,8 @@ pub struct RunLink {
     pub definition: String,
 }
 
-/// An observed link. Observing never affects the run: if [`take`](Self::take) is not called often enough, messages are missed.
+/// An observed link. Observing never affects the run: if [`take`](Self::take) is not called often enough, messages are
+/// missed.
 pub trait LinkView {
     /// Takes the messages since the last call, and the announcements of their channels.
     ///
@@ -32,8 +33,8 @@ pub trait LinkView {
 
 type Open = dyn Fn(usize) -> Result<Option<Box<dyn LinkView>>, StageError> + Send + Sync;
 
-/// The links of a run, each of which can be observed. The observed messages depend on timing: the outputs of a stage must not
-/// depend on them.
+/// The links of a run, each of which can be observed. The observed messages depend on timing: the outputs of a stage
+/// must not depend on them.
 #[derive(Clone)]
 pub struct RunLinks {
     links: Arc<[RunLink]>,
@@ -54,8 +55,8 @@ impl RunLinks {
         &self.links
     }
 
-    /// Starts to observe a link, by its index in [`all`](Self::all). A live link repeats the last message of each topic for it.
-    /// None if its stage has not created it yet.
+    /// Starts to observe a link, by its index in [`all`](Self::all). A live link repeats the last message of each topic
+    /// for it. None if its stage has not created it yet.
     ///
     /// # Errors
     /// The run has ended, or the link has the maximum number of observers.

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TagFields {
-    /// An array each of whose elements is a reading, in which the other fields are looked for; without it the message is one.
+    /// An array each of whose elements is a reading, in which the other fields are looked for; without it the message
+    /// is one.
     pub each: Option<String>,
     /// Which tag: a text or a whole number.
     pub id_field: String,
@@ -25,8 +26,8 @@ pub struct TagFields {
     pub stddev: Option<f64>,
     /// The pose or the point at which the tag is in the frame of the message's header, metres.
     pub pose_field: Option<String>,
-    /// The direction in which the tag is: the angle about the z axis of the frame of the message's header, from its x axis on and
-    /// counterclockwise.
+    /// The direction in which the tag is: the angle about the z axis of the frame of the message's header, from its x
+    /// axis on and counterclockwise.
     pub bearing_field: Option<String>,
     /// What one unit of the bearing is in radians: 0.01745 for degrees. Below 0 where it counts clockwise.
     pub bearing_unit: Option<f64>,

@@ -4,8 +4,8 @@
 //! Walls are the same for every robot and on every day. People, legs of furniture, dust and reflections in glass are
 //! not: they are evidence against right poses, and for wrong ones.
 //!
-//! - [`clean`]: objects that are too small for walls, known space that is too narrow, and the frame of a drawn sheet become
-//!   unknown.
+//! - [`clean`]: objects that are too small for walls, known space that is too narrow, and the frame of a drawn sheet
+//!   become unknown.
 
 mod clean;
 mod objects;

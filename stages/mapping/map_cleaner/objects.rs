@@ -1,12 +1,14 @@
 //! Connected objects of the occupied cells of a map.
 //!
-//! Cells are linked along rows first, to segments, so that memory goes with the outlines of objects and not with their area.
+//! Cells are linked along rows first, to segments, so that memory goes with the outlines of objects and not with their
+//! area.
 
 use super::MapCleanerParameters;
 use crate::shared::geometry::{Cell, Grid};
 use std::ops::{Range, RangeInclusive};
 
-/// Occupied cells of a row that are linked to each other. Sides of grids, and so the numbers of cells, are less than 2^32.
+/// Occupied cells of a row that are linked to each other. Sides of grids, and so the numbers of cells, are less than
+/// 2^32.
 #[derive(Clone, Copy, Debug)]
 struct Segment {
     row: u32,
@@ -99,8 +101,8 @@ fn segments(grid: &Grid<'_>, reach: u32) -> Vec<Segment> {
     segments
 }
 
-/// The number of each segment's object, where cells are linked over up to `reach` rows and columns. Objects are numbered in the
-/// order of their first segments.
+/// The number of each segment's object, where cells are linked over up to `reach` rows and columns. Objects are
+/// numbered in the order of their first segments.
 fn linked(segments: &[Segment], reach: u32) -> Vec<u32> {
     let mut sets = DisjointSets::new(segments.len());
     let mut rest = 0;
@@ -118,8 +120,8 @@ fn linked(segments: &[Segment], reach: u32) -> Vec<u32> {
     sets.numbered()
 }
 
-/// Joins the segments of two rows that are linked. No cell between the ends of a segment is further than the reach from one
-/// of its cells, so only the ends count.
+/// Joins the segments of two rows that are linked. No cell between the ends of a segment is further than the reach from
+/// one of its cells, so only the ends count.
 fn join_rows(
     sets: &mut DisjointSets,
     segments: &[Segment],

@@ -9,13 +9,13 @@ const LEAST_SPAN: f64 = 0.8;
 /// How far the cells of a side lie from the outermost, cells, and the least share of the side that they fill.
 const SIDE: usize = 4;
 const LEAST_FILLED: f64 = 0.98;
-/// Least share of the occupied cells that are not connected with the frame: where there are fewer, it is the outer wall of
-/// the building.
+/// Least share of the occupied cells that are not connected with the frame: where there are fewer, it is the outer wall
+/// of the building.
 const LEAST_REST: f64 = 0.1;
 
-/// The cells of the rectangle along the edges of a drawing, and of all that is connected with it. Sheets of one set have the
-/// same frame and the same title block, whatever they show. None for the map of a robot, or where the rectangle is the
-/// outer wall of all that is drawn.
+/// The cells of the rectangle along the edges of a drawing, and of all that is connected with it. Sheets of one set
+/// have the same frame and the same title block, whatever they show. None for the map of a robot, or where the
+/// rectangle is the outer wall of all that is drawn.
 pub(super) fn frame_of_sheet(grid: &Grid<'_>) -> Option<Vec<usize>> {
     let (width, height) = (grid.geometry.width, grid.geometry.height);
     let most_unknown = (MOST_UNKNOWN * grid.cells.len() as f64) as usize;

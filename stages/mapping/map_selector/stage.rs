@@ -27,8 +27,8 @@ struct LargestMap {
     received: LogTime,
 }
 
-/// A map with less than this share of the known area of an earlier one is another map: the closing of loops makes maps smaller, and
-/// not by so much.
+/// A map with less than this share of the known area of an earlier one is another map: the closing of loops makes maps
+/// smaller, and not by so much.
 const LEAST_SHARE: f64 = 0.5;
 
 /// The known area of a map, square metres.

@@ -29,8 +29,9 @@ pub struct ScanBeams {
 }
 
 impl ScanBeams {
-    /// Extracts the beams of a scan. Ranges below the lidar's minimum or not a number are left out; those of
-    /// its maximum, as many drivers report where nothing is, above it, or infinite, have hit nothing (REP 117). `None` if the scan is invalid.
+    /// Extracts the beams of a scan. Ranges below the lidar's minimum or not a number are left out; those of its
+    /// maximum, as many drivers report where nothing is, above it, or infinite, have hit nothing (REP 117). `None` if
+    /// the scan is invalid.
     pub fn of(scan: &RangeScan, parameters: &ScanMapperParameters) -> Option<Self> {
         let RangeScan { x, y, yaw, angle_min, angle_increment, time_increment, .. } = *scan;
         let numbers = [x, y, yaw, angle_min, angle_increment, time_increment];

@@ -3,15 +3,15 @@
 use crate::shared::geometry::Pose2;
 use gridweave_runtime::message::LogTime;
 
-/// What a robot moves between two messages at most: metres, and metres per second; radians, and radians per second. No robot in
-/// a building is as fast.
+/// What a robot moves between two messages at most: metres, and metres per second; radians, and radians per second. No
+/// robot in a building is as fast.
 const LARGEST_STEP: f64 = 0.5;
 const LARGEST_SPEED: f64 = 20.0;
 const LARGEST_TURN: f64 = 0.5;
 const LARGEST_TURN_RATE: f64 = 15.0;
 
-/// The odometry of a robot without its leaps. A driver that starts again begins at the origin, while the robot stands where it
-/// stood.
+/// The odometry of a robot without its leaps. A driver that starts again begins at the origin, while the robot stands
+/// where it stood.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ContinuousOdometry {
     /// Time and pose of the last message.

@@ -100,8 +100,8 @@ impl Robot {
         self.poses.add(time, position(pose))
     }
 
-    /// Adds a pose by odometry, and keeps it if `is_kept`. Returns it, without the leaps of odometry so far; `None` if it is
-    /// late, or comes after the start of the map without it.
+    /// Adds a pose by odometry, and keeps it if `is_kept`. Returns it, without the leaps of odometry so far; `None` if
+    /// it is late, or comes after the start of the map without it.
     pub(super) fn add_odometry(&mut self, time: LogTime, pose: &Pose2, is_kept: bool) -> Option<Pose2> {
         let is_late = self.odometry.latest_time().is_some_and(|latest| time < latest);
         if is_late || matches!(self.localization, Localization::ByScans(..)) {
@@ -228,8 +228,8 @@ impl Robot {
         }
     }
 
-    /// The map so far, `None` if nothing is known, and how many scans were left out of it just then, as it would get too
-    /// large.
+    /// The map so far, `None` if nothing is known, and how many scans were left out of it just then, as it would get
+    /// too large.
     pub(super) fn map(&mut self) -> (Option<SnapshotMap>, usize) {
         match &mut self.localization {
             Localization::NotYet => (None, 0),

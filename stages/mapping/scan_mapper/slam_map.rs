@@ -89,8 +89,8 @@ impl SlamMap {
         is_matched
     }
 
-    /// Registers a scan without adding it, from the pose `guess` with the given standard deviations of position and yaw.
-    /// The pose in the frame of odometry; `None` if the scan lies on no earlier ones.
+    /// Registers a scan without adding it, from the pose `guess` with the given standard deviations of position and
+    /// yaw. The pose in the frame of odometry; `None` if the scan lies on no earlier ones.
     pub(super) fn locate(&self, guess: &Pose2, deviations: [f64; 2], scan: &ScanBeams) -> Option<Pose2> {
         let last = self.scans.last()?.odometry;
         Some(last * self.trajectory.locate(&last.inv_mul(guess), deviations, &points(scan))?)

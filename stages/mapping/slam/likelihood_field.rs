@@ -111,8 +111,8 @@ fn around(at: f64, count: usize) -> Range<usize> {
     bounded(cell.saturating_sub(REACH))..bounded(cell.saturating_add(REACH + 1))
 }
 
-/// The likelihoods of a point in neighbouring cells along an axis, the first of which is at a distance of so many cells.
-/// Neighbouring values of a Gaussian have a ratio, which changes by the same factor from each to the next.
+/// The likelihoods of a point in neighbouring cells along an axis, the first of which is at a distance of so many
+/// cells. Neighbouring values of a Gaussian have a ratio, which changes by the same factor from each to the next.
 fn likelihoods(cells: f64) -> [f64; SIDE] {
     const SCALE: f64 = -0.5 * (CELL / DEVIATION) * (CELL / DEVIATION);
     let mut value = (SCALE * cells * cells).exp();

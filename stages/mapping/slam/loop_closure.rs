@@ -41,8 +41,8 @@ pub(super) struct Revisit<'a> {
     pub(super) recent: usize,
 }
 
-/// Looks for the last submap in the earlier ones that may be at its place. Each that fits is the pose of its middle scan
-/// in that of the earlier submap.
+/// Looks for the last submap in the earlier ones that may be at its place. Each that fits is the pose of its middle
+/// scan in that of the earlier submap.
 pub(super) fn find_loop_closures(revisit: &Revisit<'_>) -> Vec<Constraint> {
     let Some((own, earlier)) = revisit.submaps.split_last() else { return Vec::new() };
     let centre = middle(own);

@@ -10,7 +10,8 @@
 //! The division into a local registration and submaps that are searched for loop closures by branch and bound is that
 //! of Cartographer (Hess et al. 2016, "Real-time loop closure in 2D LIDAR SLAM"); a local map of the last scans, and a
 //! graph with one node for each, that of Karto and slam_toolbox (Konolige et al. 2010; Macenski and Jambrecic 2021).
-//! The noise of odometry is estimated on the way ([`OdometryNoise`]), and is not a parameter to be tuned for each robot.
+//! The noise of odometry is estimated on the way ([`OdometryNoise`]), and is not a parameter to be tuned for each
+//! robot.
 
 mod correlative_search;
 mod likelihood_field;

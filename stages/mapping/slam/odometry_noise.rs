@@ -12,8 +12,8 @@ const HALF_LIFE: f64 = 50.0;
 /// Factor by which the deviation is assumed larger than the parameter, before the first step.
 const PRIOR_FACTOR: f64 = 1.5;
 
-/// Least root of the summed squares of the turns, radians, from which they show which way the scans turn, and the correlation of
-/// both turns below which they turn against odometry.
+/// Least root of the summed squares of the turns, radians, from which they show which way the scans turn, and the
+/// correlation of both turns below which they turn against odometry.
 const LEAST_TURNS: f64 = 1.0;
 const OPPOSITE: f64 = -0.5;
 

@@ -20,8 +20,8 @@ const MAX_MOVE: [f64; 2] = [0.3, 0.1];
 /// Share of the information of a registration that counts: the scans of a submap are registered on the same points.
 const INFORMATION_SHARE: f64 = 0.3;
 
-/// Poses of scans in submaps that are at least `apart` scans before or after them, by scan. The map of a submap is built, used and
-/// dropped: those of all at once would take as much memory as the drive is long.
+/// Poses of scans in submaps that are at least `apart` scans before or after them, by scan. The map of a submap is
+/// built, used and dropped: those of all at once would take as much memory as the drive is long.
 pub(super) fn register_on_revisited(revisit: &Revisit<'_>, apart: usize) -> Vec<Constraint> {
     // The scans near each submap, each with the place of that submap among its own.
     let mut near: Vec<Vec<(usize, usize)>> = vec![Vec::new(); revisit.submaps.len()];

@@ -6,8 +6,8 @@ use nalgebra::{Matrix2, Vector2};
 /// Distance between points that are kept, metres: near the lidar beams lie closer than that, and would count as more
 /// wall than there is.
 pub(super) const SPACING: f64 = 0.05;
-/// Distance from the base up to which hits are used, metres: farther beams are too far apart to be registered, and bound
-/// what a search may cost.
+/// Distance from the base up to which hits are used, metres: farther beams are too far apart to be registered, and
+/// bound what a search may cost.
 const FARTHEST: f64 = 40.0;
 /// Number of points of a scan, at most: more than the walls of a round room of that radius have.
 const MAX_POINTS: usize = 10_000;

@@ -17,8 +17,8 @@ const RECENT_PATH: f64 = 20.0;
 /// Path of a submap, metres, and number of its scans, at most.
 const SUBMAP_PATH: f64 = 4.0;
 const SUBMAP_SCANS: usize = 30;
-/// How often the scans are registered on those of other times at the end, at most, and the move of a scan, metres, below
-/// which they are registered no more.
+/// How often the scans are registered on those of other times at the end, at most, and the move of a scan, metres,
+/// below which they are registered no more.
 const REFINEMENTS: usize = 8;
 const LEAST_REFINEMENT: f64 = 0.005;
 /// Share of its points that must lie on the local map, for a scan to be registered at all.
@@ -48,8 +48,8 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
-    /// Nothing so far. `odometry_deviation` is the standard deviation of odometry that is assumed before the first scan,
-    /// as a share of the way and the turn.
+    /// Nothing so far. `odometry_deviation` is the standard deviation of odometry that is assumed before the first
+    /// scan, as a share of the way and the turn.
     pub fn new(odometry_deviation: f64) -> Self {
         Self {
             noise: OdometryNoise::new(odometry_deviation),
@@ -112,8 +112,9 @@ impl Trajectory {
         (is_long || to - self.submap_start >= SUBMAP_SCANS) && self.finish_submap()
     }
 
-    /// Registers points on the local map, without adding them: the pose relative to the last scan, `guess` being what it
-    /// is expected to be with these standard deviations of position and yaw. `None` if the points lie on no earlier ones.
+    /// Registers points on the local map, without adding them: the pose relative to the last scan, `guess` being what
+    /// it is expected to be with these standard deviations of position and yaw. `None` if the points lie on no earlier
+    /// ones.
     pub fn locate(&self, guess: &Pose2, deviations: [f64; 2], points: &[ScanPoint]) -> Option<Pose2> {
         let last = self.graph.poses.last()?;
         let [place, yaw] = deviations.map(|deviation| deviation.powi(-2));

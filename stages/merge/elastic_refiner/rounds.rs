@@ -37,8 +37,8 @@ pub(super) struct Round {
     pub(super) solution: Solution,
 }
 
-/// Estimates the deformations of all bodies. Where most of them are known from before, the others are first aligned with
-/// them, and then all together. `None` if the equations have no solution, or one that is not finite.
+/// Estimates the deformations of all bodies. Where most of them are known from before, the others are first aligned
+/// with them, and then all together. `None` if the equations have no solution, or one that is not finite.
 pub(super) fn estimate<'a>(bodies: &'a [Body<'a>], parameters: &ElasticRefinerParameters) -> Option<Estimate<'a>> {
     let rounds = Rounds::new(bodies, parameters);
     let nodes = |is_counted: fn(&Body<'_>) -> bool| -> usize {
@@ -91,8 +91,8 @@ impl<'a> Rounds<'a> {
         Self { bodies, parameters, pairs }
     }
 
-    /// Deforms the bodies again, but for those that are given, so that walls that are near each other are aligned. `None` if
-    /// the equations have no solution, or one that is not finite.
+    /// Deforms the bodies again, but for those that are given, so that walls that are near each other are aligned.
+    /// `None` if the equations have no solution, or one that is not finite.
     fn round(&self, deformed: &mut [DeformedBody<'_>], is_given: &[bool], share: f64) -> Option<Round> {
         let Self { bodies, parameters, pairs } = self;
         let pairs: Vec<(usize, usize)> =

@@ -38,8 +38,8 @@ pub(super) fn unmerged(
     outside().map(|robot| (robot.to_owned(), reason(robot, solution, &refusals))).collect()
 }
 
-/// The same for the robots that an alignment of `pair` concerns: those of the pair, and those connected with them. The work goes
-/// with their alignments, not with those of all robots.
+/// The same for the robots that an alignment of `pair` concerns: those of the pair, and those connected with them. The
+/// work goes with their alignments, not with those of all robots.
 pub(super) fn of_pair(
     pair: &RobotPair,
     robots: &BTreeSet<String>,

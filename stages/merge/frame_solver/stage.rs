@@ -216,8 +216,8 @@ impl FrameSolver {
         self.send_all(output)
     }
 
-    /// Reasons why robots are not merged, as alignments give them, with what is known of their maps: where a map cannot be
-    /// used, that is the reason; where others have maps and a robot has none, it has only tags.
+    /// Reasons why robots are not merged, as alignments give them, with what is known of their maps: where a map cannot
+    /// be used, that is the reason; where others have maps and a robot has none, it has only tags.
     fn with_maps(&self, mut reasons: BTreeMap<String, String>) -> BTreeMap<String, String> {
         for (robot, reason) in &mut reasons {
             if let Some(error) = self.unusable_maps.get(robot) {
@@ -319,8 +319,8 @@ impl FrameSolver {
         Ok(true)
     }
 
-    /// As long as the reference may change, no transform to the world is certain, and only the world itself is sent: viewers
-    /// show nothing in a frame that no transform names.
+    /// As long as the reference may change, no transform to the world is certain, and only the world itself is sent:
+    /// viewers show nothing in a frame that no transform names.
     fn send_transforms(
         &mut self,
         frames: &RobotFrames,

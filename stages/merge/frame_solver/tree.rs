@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 
 /// Frames that were sent as transforms.
 ///
-/// A reader of static transforms keeps what it received: it drops no frame, and a frame that is sent in two trees connects
-/// them. So a frame is sent only in the tree that it stays in. The robots of a group may still be connected with the
-/// reference, so they are sent at the end. A robot that has been in the world and no longer is keeps its transform; the
-/// frames of the solver say that it is not merged.
+/// A reader of static transforms keeps what it received: it drops no frame, and a frame that is sent in two trees
+/// connects them. So a frame is sent only in the tree that it stays in. The robots of a group may still be connected
+/// with the reference, so they are sent at the end. A robot that has been in the world and no longer is keeps its
+/// transform; the frames of the solver say that it is not merged.
 #[derive(Debug, Default)]
 pub(super) struct Tree {
     /// Parent of every frame that was sent, and its pose in it.
@@ -16,8 +16,8 @@ pub(super) struct Tree {
 }
 
 impl Tree {
-    /// The first transform, with which the world is known before any robot is in it: from the frame `header` names to a child
-    /// of its own at the same place. None if anything was sent before.
+    /// The first transform, with which the world is known before any robot is in it: from the frame `header` names to a
+    /// child of its own at the same place. None if anything was sent before.
     pub(super) fn open(&mut self, header: &Header) -> Option<TFMessage> {
         if !self.sent.is_empty() {
             return None;

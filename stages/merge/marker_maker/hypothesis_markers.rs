@@ -1,8 +1,8 @@
 //! The shapes of the hypotheses of all pairs of robots, and those that are to be sent when one pair has changed.
 //!
-//! While there are few, each message shows all, which late joiners need. Of many, it shows only those of the pair that has
-//! changed, and again all once half as many were sent as there are. So no more than a few times of what is new is sent, however
-//! many robots there are.
+//! While there are few, each message shows all, which late joiners need. Of many, it shows only those of the pair that
+//! has changed, and again all once half as many were sent as there are. So no more than a few times of what is new is
+//! sent, however many robots there are.
 
 use super::hypotheses;
 use super::shapes::hypothesis_shapes;

@@ -36,7 +36,8 @@ pub fn segments(found: &Segments, colour: [u8; 3]) -> MarkerArray {
     array(&found.header, [lines.marker("walls", WALL_WIDTH)])
 }
 
-/// The direction of a map's walls as an arrow, and another across it, at the origin of the map frame. Nothing if there is none.
+/// The direction of a map's walls as an arrow, and another across it, at the origin of the map frame. Nothing if there
+/// is none.
 pub fn direction(found: &MapDirection, colour: [u8; 3]) -> MarkerArray {
     let angles = [0.0, std::f64::consts::FRAC_PI_2].map(|turn| found.direction + turn);
     let is_sound = found.valid && found.direction.is_finite();

@@ -23,8 +23,8 @@ pub struct Deformed {
     pub covariance: Matrix3<f64>,
     /// Root mean square of the displacement of points from the rigid transform, metres.
     pub rms: f64,
-    /// Size of map b as it is deformed, as a share of its size. The deformation is estimated as small as the maps allow, so
-    /// it does not reach the whole error of a wrong resolution.
+    /// Size of map b as it is deformed, as a share of its size. The deformation is estimated as small as the maps
+    /// allow, so it does not reach the whole error of a wrong resolution.
     pub scale: f64,
     /// Cost of the deformation, see [`RefinedMap::cost`](crate::merge::elastic_refiner::RefinedMap::cost).
     pub cost: f64,
@@ -70,8 +70,8 @@ impl Deformed {
 }
 
 /// Fits the rigid `T_a_b` nearest to a deformation of map b, over the points that both maps know, and the size of map b
-/// under it. The covariance of the transform is what the deformation leaves: points are displaced and turned against it.
-/// Half of either may be the same everywhere, as far as the maps show, and then the transform is wrong by that.
+/// under it. The covariance of the transform is what the deformation leaves: points are displaced and turned against
+/// it. Half of either may be the same everywhere, as far as the maps show, and then the transform is wrong by that.
 fn nearest_rigid(
     a: &MapView<'_>,
     b: &WallMap,

@@ -90,8 +90,8 @@ pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: 
     }
 }
 
-/// Iterates on all points at the least distance until they hardly move, or come back to where they were. Returns how far
-/// they moved last, root mean square, metres.
+/// Iterates on all points at the least distance until they hardly move, or come back to where they were. Returns how
+/// far they moved last, root mean square, metres.
 fn settle(iteration: &mut Iteration<'_>, transform_a_b: &mut Pose2, errors: &mut Vec<f64>) -> Option<f64> {
     let parameters = iteration.parameters;
     let mut motions = Vec::new();

@@ -8,8 +8,8 @@ use crate::registration::pose_window::PoseWindow;
 use crate::registration::{Basis, Hypothesis};
 use crate::shared::geometry::Pose2;
 
-/// Deformations are shown in centimetres: one that exceeds the allowed one by no more than they are rounded by is not refused,
-/// metres.
+/// Deformations are shown in centimetres: one that exceeds the allowed one by no more than they are rounded by is not
+/// refused, metres.
 const ROUNDING: f64 = 0.005;
 
 /// What the user knows about a pair of robots.
@@ -179,8 +179,8 @@ fn unexpected(candidate: Candidate, window: &PoseWindow) -> Verdict {
     Verdict { refusal: Some(refusal), ..Verdict::of(candidate) }
 }
 
-/// Why a verdict is refused, where one of all other candidates is right with a probability; none if it is as probable as
-/// required.
+/// Why a verdict is refused, where one of all other candidates is right with a probability; none if it is as probable
+/// as required.
 fn refusal(verdict: &Verdict, of_others: f64, parameters: &JudgementParameters) -> Option<Refusal> {
     let JudgementParameters { accept, max_bend: most, .. } = *parameters;
     let Verdict { candidate, probability, rival, .. } = verdict;

@@ -37,9 +37,9 @@ pub struct JudgementParameters {
     /// of a metre between them.
     #[schemars(range(min = 1e-6, max = 1.0))]
     pub turn: f64,
-    /// Largest error of the resolution of a map that is looked for at the end, as a share of it, where a robot is merged
-    /// with no other: the reason then names the scale at which the maps agree. Where there is none, half and twice the
-    /// resolution are looked for. 0 looks for none, as that takes as long as many searches.
+    /// Largest error of the resolution of a map that is looked for at the end, as a share of it, where a robot is
+    /// merged with no other: the reason then names the scale at which the maps agree. Where there is none, half and
+    /// twice the resolution are looked for. 0 looks for none, as that takes as long as many searches.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub scale_range: f64,
     /// Number of the right hypothesis in the list of a refusal, as the user has chosen it. The key is a robot, for

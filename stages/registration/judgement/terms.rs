@@ -81,8 +81,8 @@ impl Term {
 pub struct Terms(pub [f64; COUNT]);
 
 impl Terms {
-    /// Terms of a hypothesis with a peak significance and a margin over chance, the standard deviation of its position, metres, the agreement
-    /// of the maps, and the cost of the deformation of map b.
+    /// Terms of a hypothesis with a peak significance and a margin over chance, the standard deviation of its position,
+    /// metres, the agreement of the maps, and the cost of the deformation of map b.
     pub fn new(
         (significance, margin): (f64, f64),
         deviation: f64,

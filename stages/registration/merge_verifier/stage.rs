@@ -245,8 +245,8 @@ impl MergeVerifier {
     }
 }
 
-/// First paragraph of the reason for a pair whose maps agree at another scale, where the cells of map b are `cell` metres
-/// wide by its resolution.
+/// First paragraph of the reason for a pair whose maps agree at another scale, where the cells of map b are `cell`
+/// metres wide by its resolution.
 fn scale_reason(scale: &Scale, pair: &RobotPair, cell: f64) -> String {
     let Scale { factor, verdict } = scale;
     let RobotPair { a, b } = pair;

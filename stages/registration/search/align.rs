@@ -120,7 +120,8 @@ pub fn align_prepared(
     })
 }
 
-/// Peak significance of the best pose of map b in map a, of two maps in cells of the same size; 0 where they fit nowhere.
+/// Peak significance of the best pose of map b in map a, of two maps in cells of the same size; 0 where they fit
+/// nowhere.
 pub fn peak_significance(a: &PreparedMap, b: &PreparedMap, parameters: &MapAlignerParameters) -> f64 {
     let peaks = Peaks::find(a, b, Extent::All, parameters);
     let Some(best) = peaks.all().first() else { return 0.0 };

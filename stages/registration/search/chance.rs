@@ -1,9 +1,10 @@
 //! What chance reaches: how well maps with walls like these fit where they do not belong.
 //!
-//! The mirror image of a map has the same walls, rooms and clutter, and fits nowhere, but by chance. So its best pose in
-//! a search like that of the map itself shows what the best pose of such maps reaches by chance: it is a decoy, as in
-//! Elias and Gygi, "Target-decoy search strategy" (Nature Methods 2007). It is searched in full, also where the
-//! initial poses leave few poses of the map itself, as the best of fewer poses would reach less. Where the second-best pose of the map itself comes near the best one, that shows it already.
+//! The mirror image of a map has the same walls, rooms and clutter, and fits nowhere, but by chance. So its best pose
+//! in a search like that of the map itself shows what the best pose of such maps reaches by chance: it is a decoy, as
+//! in Elias and Gygi, "Target-decoy search strategy" (Nature Methods 2007). It is searched in full, also where the
+//! initial poses leave few poses of the map itself, as the best of fewer poses would reach less. Where the second-best
+//! pose of the map itself comes near the best one, that shows it already.
 
 use super::{Extent, MapAlignerParameters, Peaks, PreparedMap, ScoredPose};
 

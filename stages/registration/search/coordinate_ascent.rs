@@ -70,8 +70,8 @@ pub(super) fn moved(transform_a_b: &Pose2, centre: &Point2, step: &Vector3<f64>)
     Pose2::from_parts((centre.coords + arm + step.xy()).into(), turn * transform_a_b.rotation)
 }
 
-/// Refines a pose to the peak of the smooth score near it, to an eighth of a cell of the overlay and of `radians`. Rotations are
-/// about `centre`, the centroid of the walls in common, in frame a.
+/// Refines a pose to the peak of the smooth score near it, to an eighth of a cell of the overlay and of `radians`.
+/// Rotations are about `centre`, the centroid of the walls in common, in frame a.
 pub fn refine_peak(overlay: &Overlay<'_>, transform_a_b: &Pose2, centre: &Point2, radians: f64) -> Pose2 {
     let steps = Steps { metres: overlay.a.cell, radians, halvings: HALVINGS };
     coordinate_ascent(|pose| overlay.smooth_score(pose), transform_a_b, centre, steps).transform_a_b

@@ -114,8 +114,8 @@ impl Peaks {
     }
 }
 
-/// The first of some poses within `apart` and `radians` at which there is at least so much common wall, metres, most of it
-/// seen from the same side, each with the centroid of its common walls.
+/// The first of some poses within `apart` and `radians` at which there is at least so much common wall, metres, most of
+/// it seen from the same side, each with the centroid of its common walls.
 fn apart_from_better(
     overlay: &Overlay<'_>,
     poses: &[ScoredPose],

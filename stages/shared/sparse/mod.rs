@@ -1,8 +1,8 @@
 //! Direct solution of sparse symmetric systems of blocks of 3 x 3: those of poses and of nodes of a deformation.
 //!
-//! [`nested_dissection`] orders the unknowns, [`factor`] computes the Cholesky factor in that order, and [`BlockCholesky`]
-//! solves with it and computes the parts of the inverse that are needed. Arithmetic is done on dense parts, the fronts
-//! of an assembly tree.
+//! [`nested_dissection`] orders the unknowns, [`factor`] computes the Cholesky factor in that order, and
+//! [`BlockCholesky`] solves with it and computes the parts of the inverse that are needed. Arithmetic is done on dense
+//! parts, the fronts of an assembly tree.
 
 mod assembly_tree;
 mod block_cholesky;

@@ -1,5 +1,5 @@
-//! How large the things are that the points of a map's walls belong to: walls of the building, or furniture, pillars and
-//! the short stretches of wall between doors and in niches.
+//! How large the things are that the points of a map's walls belong to: walls of the building, or furniture, pillars
+//! and the short stretches of wall between doors and in niches.
 
 use crate::shared::geometry::PointIndex;
 use nalgebra::Vector2;
@@ -37,7 +37,8 @@ pub(super) fn extents(walls: &PointIndex, normals: &[Vector2<f64>], spacing: f64
 }
 
 /// Groups neighbouring points, each group from its first point outwards, and gives for each point the extent of its
-/// group. `is_joined(first, from, to)` says whether `to` belongs to the group of `first`, in which `from` is its neighbour.
+/// group. `is_joined(first, from, to)` says whether `to` belongs to the group of `first`, in which `from` is its
+/// neighbour.
 fn extents_of_groups(walls: &PointIndex, link: f64, is_joined: impl Fn(usize, usize, usize) -> bool) -> Vec<f64> {
     let points = walls.points();
     let mut is_left = vec![true; points.len()];

@@ -9,8 +9,8 @@ use nalgebra::Vector2;
 
 /// Distance between the samples of known space, metres.
 const SAMPLE_SPACING: f64 = 0.2;
-/// Most points of walls, more than those of any published map of a building, and most samples of known space: the memory and
-/// the time of a comparison go with them. Beyond it only some are taken, evenly.
+/// Most points of walls, more than those of any published map of a building, and most samples of known space: the
+/// memory and the time of a comparison go with them. Beyond it only some are taken, evenly.
 const MOST_POINTS: usize = 1 << 20;
 const MOST_SAMPLES: usize = 1 << 24;
 /// Side of a bucket of wall points, metres: near the last search radius of a registration, so that nine buckets
@@ -23,8 +23,8 @@ const MOST_UNKNOWN: isize = 2;
 /// A map's walls as points with normals, and samples of its known space.
 #[derive(Clone, Debug)]
 pub struct WallMap {
-    /// The walls: one point for each occupied cell that faces known space, or for some of very many, moved onto the line
-    /// through its neighbours.
+    /// The walls: one point for each occupied cell that faces known space, or for some of very many, moved onto the
+    /// line through its neighbours.
     pub walls: PointIndex,
     /// Unit normals of the walls, in the order of the index; zero where the neighbours show no line.
     pub normals: Vec<Vector2<f64>>,

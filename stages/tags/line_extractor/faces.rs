@@ -177,7 +177,8 @@ impl Profile {
     }
 }
 
-/// Smooths with the binomial kernel of five bins, a standard deviation of one bin. The two bins at either end stay empty.
+/// Smooths with the binomial kernel of five bins, a standard deviation of one bin. The two bins at either end stay
+/// empty.
 fn smooth(from: &[f64], to: &mut [f64]) {
     for (value, near) in to[2..].iter_mut().zip(from.windows(5)) {
         *value = ((near[0] + near[4]) + 4.0 * (near[1] + near[3]) + 6.0 * near[2]) / 16.0;

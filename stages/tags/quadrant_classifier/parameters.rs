@@ -135,8 +135,8 @@ pub struct QuadrantClassifierParameters {
     /// Least certainty of a single tag in both maps.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub single_tag_certainty: f64,
-    /// Largest root mean square of the tags' residuals, metres, or twice what their covariances make likely, if that is more;
-    /// else the maps are not aligned.
+    /// Largest root mean square of the tags' residuals, metres, or twice what their covariances make likely, if that is
+    /// more; else the maps are not aligned.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_residual: f64,
     /// A pair's alignment is sent again when it has moved by more than this, metres, or one of its maps has changed.

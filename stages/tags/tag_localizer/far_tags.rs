@@ -1,10 +1,10 @@
 //! Tags that are read from far away, as by UWB radios: their positions, together with the calibration of the robot's
 //! radio.
 //!
-//! A radio measures `(1 + scale) distance + offset`: delays in antennas and clocks make ranges of tens of metres too long
-//! by metres. Both are the same for all tags of a robot, so they are estimated with the positions: nonlinear least squares
-//! by Gauss-Newton, with Cauchy weights against echoes. From the equations of each tag its position is eliminated (Schur
-//! complement), so the work grows with the readings and not with the area.
+//! A radio measures `(1 + scale) distance + offset`: delays in antennas and clocks make ranges of tens of metres too
+//! long by metres. Both are the same for all tags of a robot, so they are estimated with the positions: nonlinear least
+//! squares by Gauss-Newton, with Cauchy weights against echoes. From the equations of each tag its position is
+//! eliminated (Schur complement), so the work grows with the readings and not with the area.
 
 use super::noise::{Noise, cost, weight};
 use super::{GridSize, Likelihood, Posterior, Ray, Readout, Ring, TagLocalizerParameters, TagMode, read_out};
@@ -88,8 +88,8 @@ pub(super) fn locate(tags: &[FarTag], parameters: &TagLocalizerParameters) -> Ve
     estimates.iter().map(|estimate| estimate.as_ref()?.mode(&calibration, &covariance?)).collect()
 }
 
-/// Refines all positions and the calibration, and returns the covariance of the latter; `None` if it is not determined. A tag
-/// whose readings determine no position is dropped.
+/// Refines all positions and the calibration, and returns the covariance of the latter; `None` if it is not determined.
+/// A tag whose readings determine no position is dropped.
 fn solve(estimates: &mut [Option<Estimate<'_>>], calibration: &mut Calibration) -> Option<Matrix2<f64>> {
     let mut covariance = None;
     for _ in 0..ITERATIONS {
@@ -133,8 +133,8 @@ fn solve(estimates: &mut [Option<Estimate<'_>>], calibration: &mut Calibration) 
 }
 
 impl<'a> Estimate<'a> {
-    /// Searches a tag on a grid that holds all places from which it could have been read, where the calibration is part of the
-    /// noise.
+    /// Searches a tag on a grid that holds all places from which it could have been read, where the calibration is part
+    /// of the noise.
     fn new(tag: &'a FarTag, parameters: &TagLocalizerParameters) -> Option<Self> {
         let TagLocalizerParameters { offset_stddev, scale_stddev, outlier_share, reach, .. } = *parameters;
         let mut radii: Vec<f64> = tag.ranges.iter().map(|ring| ring.radius).collect();
@@ -233,8 +233,8 @@ impl<'a> Estimate<'a> {
         is_valid.then_some(TagMode { position, covariance, certainty, window: position, mass })
     }
 
-    /// The probability of the place beside that of its mirror image in the line of the drive, which fits nearly as well where
-    /// the robot drove straight on.
+    /// The probability of the place beside that of its mirror image in the line of the drive, which fits nearly as well
+    /// where the robot drove straight on.
     fn share_of_mirror_image(&self, calibration: &Calibration, covariance: &Matrix2<f64>) -> f64 {
         let count = self.tag.ranges.len() as f64;
         let anchor = self.place;

@@ -24,8 +24,8 @@ const LEAST_SIGHTING_STDDEV: f64 = 0.01;
 const FARTHEST: f64 = 1000.0;
 /// Least distance between keyframes, metres.
 const LEAST_SPACING: f64 = 0.1;
-/// Tags of long range, and tags with the drive, are located again when there are so many times as many readings, and at the
-/// end.
+/// Tags of long range, and tags with the drive, are located again when there are so many times as many readings, and at
+/// the end.
 const MORE_READINGS: f64 = 1.5;
 
 /// Localizes all tags of one robot from its poses and readings.
@@ -108,8 +108,8 @@ impl TagLocalizer {
         }
     }
 
-    /// The poses of the robot as they were estimated with the tags, where the poses that it got drift: a batch with its last
-    /// estimate, once.
+    /// The poses of the robot as they were estimated with the tags, where the poses that it got drift: a batch with its
+    /// last estimate, once.
     pub fn take_estimated_poses(&mut self) -> Vec<(LogTime, Pose2)> {
         std::mem::take(&mut self.estimated_poses)
     }
@@ -323,8 +323,8 @@ impl TagLocalizer {
         if any_far && self.locate_far(is_end) { true } else { any }
     }
 
-    /// Locates all tags of long range, unless there are hardly more readings than the last time: all of them are located
-    /// together. Returns whether it did.
+    /// Locates all tags of long range, unless there are hardly more readings than the last time: all of them are
+    /// located together. Returns whether it did.
     fn locate_far(&mut self, is_end: bool) -> bool {
         let parameters = &self.parameters;
         let far = || self.tags.values().filter(|tag| tag.is_far() && tag.readings() >= parameters.min_readings);
@@ -342,8 +342,8 @@ impl TagLocalizer {
         true
     }
 
-    /// Locates all tags together with the drive, if its odometry may drift. Returns whether any was located, and `None` if that is
-    /// left to the tags one by one.
+    /// Locates all tags together with the drive, if its odometry may drift. Returns whether any was located, and `None`
+    /// if that is left to the tags one by one.
     fn locate_with_drive(&mut self, is_end: bool) -> Option<bool> {
         let drive = self.drive.as_ref().filter(|drive| drive.len() >= self.parameters.min_readings as usize)?;
         let is_more = drive.len() as f64 >= MORE_READINGS * self.drive_readings as f64;

@@ -12,8 +12,8 @@
 //! - [`RingProduct`] is the product of the rings, in logarithms: 300 factors underflow.
 //! - [`Posterior`] is the product on the grid, computed from coarse to fine without negligible cells.
 //! - [`read_out`] finds the window, and the mode around it.
-//! - `far_tags` locates tags that are read from beyond `reach`, together with the calibration of the radio: on no grid of
-//!   fine cells, as that of a large area would be.
+//! - `far_tags` locates tags that are read from beyond `reach`, together with the calibration of the radio: on no grid
+//!   of fine cells, as that of a large area would be.
 //! - `landmark_slam` estimates the drive with the tags, where poses by odometry drift.
 //! - [`PoseTrack`] interpolates the pose of the robot at the time of a reading, with its covariance.
 

@@ -20,8 +20,8 @@ impl Noise {
     /// What the readings claim.
     pub(super) const CLAIMED: Self = Self { factor: 1.0, correlated: 1.0 };
 
-    /// The noise of readings with these residuals, in the standard deviations that they claim and in the order of the drive:
-    /// at least what they claim.
+    /// The noise of readings with these residuals, in the standard deviations that they claim and in the order of the
+    /// drive: at least what they claim.
     pub(super) fn of(residuals: &[f64]) -> Self {
         let mut sizes: Vec<f64> = residuals.iter().map(|residual| residual.abs()).collect();
         sizes.sort_by(f64::total_cmp);

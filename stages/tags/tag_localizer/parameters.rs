@@ -38,8 +38,8 @@ pub struct TagLocalizerParameters {
     #[schemars(range(min = 0.0))]
     pub window_deviations: f64,
     /// Largest distance at which a tag of short range is read, metres. Greater readings of such a tag are left out, and
-    /// it is read out when it is out of reach. The paper has 3 m. A tag most of whose readings are greater has a radio of
-    /// long range, such as UWB: all its readings count, and its reach is theirs.
+    /// it is read out when it is out of reach. The paper has 3 m. A tag most of whose readings are greater has a radio
+    /// of long range, such as UWB: all its readings count, and its reach is theirs.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub reach: f64,
     /// Least standard deviation of a reading, metres: used where a reading has none, or a smaller one. The paper has
@@ -88,8 +88,9 @@ pub struct TagLocalizerParameters {
     pub max_pose_age: f64,
     /// A tag with fewer readings is not reported.
     pub min_readings: u32,
-    /// Whether the poses may be those of an odometry that drifts: then, if the readings show that it does, tags and poses are
-    /// estimated together, in the frame of the first pose. Not for robots with maps, in which their poses do not drift.
+    /// Whether the poses may be those of an odometry that drifts: then, if the readings show that it does, tags and
+    /// poses are estimated together, in the frame of the first pose. Not for robots with maps, in which their poses do
+    /// not drift.
     pub drift: bool,
 }
 

@@ -19,8 +19,8 @@ const WIDER: f64 = 4.0;
 /// Readings and estimate of one tag.
 #[derive(Clone, Debug)]
 pub(super) struct Tag {
-    /// The centre of the grid: the position of the robot at the first range, or that of the first sighting. As long as there is
-    /// neither, it is the position of the sensor at the first bearing, which says nothing of the distance.
+    /// The centre of the grid: the position of the robot at the first range, or that of the first sighting. As long as
+    /// there is neither, it is the position of the sensor at the first bearing, which says nothing of the distance.
     pub(super) first_place: Point2,
     /// Ranges within the reach of a tag of short range.
     pub(super) groups: ReadingGroups,

@@ -6,13 +6,12 @@ use std::f64::consts::SQRT_2;
 impl SkeletonGraph {
     /// Removes spurs: dead ends from corners and rough walls.
     ///
-    /// A path of length `l` from a junction with clearance `r` to an end with clearance `e` shows free space up to
-    /// `l + e` from the junction. A square corner extends to `sqrt(2) * r`, whatever the size of the room. The path is a
+    /// A path of length `l` from a junction with clearance `r` to an end with clearance `e` shows free space up to `l +
+    /// e` from the junction. A square corner extends to `sqrt(2) * r`, whatever the size of the room. The path is a
     /// spur if it extends less than `min_spur` metres beyond that. All spurs are removed at once, so that a corridor
-    /// that ends between two corners ends in the middle. A junction that is left with two paths becomes a part of
-    /// one, with one path an end, and with none an isolated node; then spurs are sought again, until there are none.
-    /// At last a path between two ends that meets no other is one node if it is shorter than the clearance there: a
-    /// room.
+    /// that ends between two corners ends in the middle. A junction that is left with two paths becomes a part of one,
+    /// with one path an end, and with none an isolated node; then spurs are sought again, until there are none. At last
+    /// a path between two ends that meets no other is one node if it is shorter than the clearance there: a room.
     pub fn prune(&mut self, min_spur: f64) {
         while self.take_out_spurs(min_spur) {
             self.join_ways();

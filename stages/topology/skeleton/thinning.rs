@@ -5,9 +5,9 @@ use rayon::prelude::*;
 
 /// Cells are taken away in the order of their distances in steps of this part of a cell.
 const STEPS_PER_CELL: f32 = 4.0;
-/// A cell from which the distance grows by less than this from centre to centre, to each of its neighbours, lies on a ridge.
-/// Towards a square corner a ridge falls by 0.71, in a corridor of even width by 0, and on a slope there is a neighbour beyond
-/// whose distance is greater by 0.92 or more.
+/// A cell from which the distance grows by less than this from centre to centre, to each of its neighbours, lies on a
+/// ridge. Towards a square corner a ridge falls by 0.71, in a corridor of even width by 0, and on a slope there is a
+/// neighbour beyond whose distance is greater by 0.92 or more.
 const RIDGE_SLOPE: f32 = 0.55;
 
 /// Rows that are sorted together.
@@ -69,7 +69,8 @@ impl Skeleton {
 struct Band {
     /// The places of ridges, row by row.
     ridges: Vec<u32>,
-    /// The places of all other cells that have the clearance, by steps of their distances, and row by row within a step.
+    /// The places of all other cells that have the clearance, by steps of their distances, and row by row within a
+    /// step.
     slopes: Vec<u32>,
     /// Where in `slopes` each step begins, and where the last ends.
     starts: Vec<usize>,
@@ -81,8 +82,8 @@ const NARROW: u32 = 0;
 const RIDGE: u32 = 1;
 
 impl Band {
-    /// Sorts the cells of the rows from `number * BAND` on that have a clearance of `least`, and marks them in `cells`. The
-    /// memory of `kinds` is used again.
+    /// Sorts the cells of the rows from `number * BAND` on that have a clearance of `least`, and marks them in `cells`.
+    /// The memory of `kinds` is used again.
     fn of(distances: &DistanceMap, least: f32, number: usize, cells: &mut [u8], kinds: &mut Vec<u32>) -> Self {
         let (stride, all) = (distances.window.stride, &distances.distances);
         kinds.clear();
@@ -177,7 +178,8 @@ fn thin_from_four_sides(cells: &mut [u8], mut rest: Vec<u32>, stride: usize) {
 
 /// Which of the eight neighbours of a cell are there: a bit each, column by column.
 pub(super) fn neighbourhood(cells: &[u8], place: usize, stride: usize) -> u8 {
-    // Three cells of a row, in the lowest bits of three bytes. What reaches beyond the last cell is the rim, where nothing is.
+    // Three cells of a row, in the lowest bits of three bytes. What reaches beyond the last cell is the rim, where
+    // nothing is.
     let three = |place: usize| match cells.get(place - 1..place + 3) {
         Some(&[before, at, behind, _]) => u32::from_le_bytes([before, at, behind, 0]),
         _ => 0,
@@ -201,8 +203,9 @@ const REMOVABLE: [bool; 256] = {
     removable
 };
 
-/// The connectivity number of a cell for lines that hang together by sides and corners (Yokoi, Toriwaki and Fukumura 1975): 0
-/// for one that stands alone or is surrounded, 1 for one that can be taken away, more for one that ties pieces together.
+/// The connectivity number of a cell for lines that hang together by sides and corners (Yokoi, Toriwaki and Fukumura
+/// 1975): 0 for one that stands alone or is surrounded, 1 for one that can be taken away, more for one that ties pieces
+/// together.
 const fn connectivity_number(neighbours: usize) -> usize {
     // The bits of the eight neighbours on the way round the cell, from the right one.
     const ROUND: [usize; 8] = [6, 5, 3, 0, 1, 2, 4, 7];

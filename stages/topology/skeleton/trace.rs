@@ -24,8 +24,8 @@ struct Tracer {
     /// For each cell of the window one of the above.
     cells: Vec<u8>,
     stride: usize,
-    /// The number of the node that a cell belongs to. Few cells do: a list of all that has their numbers would take most of the
-    /// time.
+    /// The number of the node that a cell belongs to. Few cells do: a list of all that has their numbers would take
+    /// most of the time.
     nodes: BTreeMap<usize, usize>,
     /// The cells of each node.
     node_cells: Vec<Vec<usize>>,

@@ -2,8 +2,8 @@
 
 use crate::shared::geometry::{Cell, CellBox, GridGeometry};
 
-/// The part of a grid that holds its free cells, with a rim of one cell all round that is never free: every cell that matters
-/// has eight neighbours.
+/// The part of a grid that holds its free cells, with a rim of one cell all round that is never free: every cell that
+/// matters has eight neighbours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Window {
     /// Geometry of the grid.

@@ -11,8 +11,8 @@ use std::f64::consts::TAU;
 pub struct IcpSvd {
     /// `T_a_b` at the end of the run.
     pub transform_a_b: Pose2,
-    /// The sum of the squared distances from the nodes of b to the nearest nodes of a after each iteration, square metres:
-    /// equation 4 over nearest nodes.
+    /// The sum of the squared distances from the nodes of b to the nearest nodes of a after each iteration, square
+    /// metres: equation 4 over nearest nodes.
     pub errors: Vec<f64>,
     /// Whether it ended because the error no longer changed, and not by the limit of iterations.
     pub converged: bool,

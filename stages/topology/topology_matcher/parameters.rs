@@ -29,8 +29,8 @@ pub struct TopologyMatcherParameters {
     /// `exhaustive`: spacing of the turns from 0 to 360 degrees, radians.
     #[schemars(range(min = 1e-3, max = PI))]
     pub turn_step: f64,
-    /// `icp_svd`: a run ends when the sum of the squared distances from nodes to their nearest nodes changes by less than
-    /// this, square metres.
+    /// `icp_svd`: a run ends when the sum of the squared distances from nodes to their nearest nodes changes by less
+    /// than this, square metres.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub tau: f64,
     /// `icp_svd`: number of evenly spaced turns from which runs start. The published method has one, without a turn.

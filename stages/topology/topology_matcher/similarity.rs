@@ -14,7 +14,8 @@ pub struct PathPair {
 }
 
 /// The pairs of paths that coincide when map b is placed on map a: their number is the similarity of equation 2, each
-/// pair counting as in equation 3, where ends are equal that lie within `tolerance` metres. A path may be read from either end.
+/// pair counting as in equation 3, where ends are equal that lie within `tolerance` metres. A path may be read from
+/// either end.
 pub fn coinciding(a: &Topology, b: &Topology, transform_a_b: &Pose2, tolerance: f64) -> Vec<PathPair> {
     let placed: Vec<Point2> = b.nodes.iter().map(|node| transform_a_b * node).collect();
     let paths_a: Vec<[usize; 2]> = a.long_paths(tolerance).collect();

@@ -22,7 +22,8 @@ use std::sync::{Arc, Condvar, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-/// Arguments of `simulate` for a small building, mapped with exact poses, in which two robots share most of what they see.
+/// Arguments of `simulate` for a small building, mapped with exact poses, in which two robots share most of what they
+/// see.
 pub(crate) const SMALL_BUILDING: [&str; 14] = [
     "--robots",
     "2",

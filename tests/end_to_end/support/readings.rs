@@ -6,8 +6,8 @@ use nalgebra::{Isometry2, Point2, Vector2};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Writes a log again with its messages changed: `change` is given the topic, the type and the bytes of each, and gives none
-/// for one that is to be left out.
+/// Writes a log again with its messages changed: `change` is given the topic, the type and the bytes of each, and gives
+/// none for one that is to be left out.
 pub(crate) fn change_log(log: &Path, to: &Path, mut change: impl FnMut(&str, &str, &[u8]) -> Option<Vec<u8>>) {
     let bytes = std::fs::read(log).unwrap();
     let mut changed = LogBuilder::new(to);
@@ -23,8 +23,8 @@ pub(crate) fn change_log(log: &Path, to: &Path, mut change: impl FnMut(&str, &st
     changed.finish();
 }
 
-/// Writes a log again with its tag readings changed: `change` is given the robot, the reading, and the place of the robot in
-/// its map, and gives none for a reading that is to be left out. Topics are as the simulator has them.
+/// Writes a log again with its tag readings changed: `change` is given the robot, the reading, and the place of the
+/// robot in its map, and gives none for a reading that is to be left out. Topics are as the simulator has them.
 pub(crate) fn change_readings(
     log: &Path,
     to: &Path,
@@ -53,8 +53,8 @@ pub(crate) fn place_in_map_2(truth: &serde_json::Value, tag: &str) -> Point2<f64
     transform_1_2.inverse() * Point2::new(number(&place[0]), number(&place[1]))
 }
 
-/// A reading as it would be if the tag were at `to` and not at `from`, for a robot at `position`: it keeps its noise. None if
-/// the tag is out of reach there.
+/// A reading as it would be if the tag were at `to` and not at `from`, for a robot at `position`: it keeps its noise.
+/// None if the tag is out of reach there.
 pub(crate) fn moved_reading(
     mut reading: TagRange,
     position: Point2<f64>,

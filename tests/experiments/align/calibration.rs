@@ -36,8 +36,8 @@ impl Calibration {
         self.curve(results)
     }
 
-    /// The share that is right by the mean score of each bin of odds, each bin ten times the odds of the one before or, in the
-    /// middle, three times.
+    /// The share that is right by the mean score of each bin of odds, each bin ten times the odds of the one before or,
+    /// in the middle, three times.
     fn curve(&self, results: &mut Results) -> Result<()> {
         let odds = |score: f64| (score / (1.0 - score).max(1e-12)).log10();
         let borders: Vec<f64> = (-8..=8).map(|half| 0.5 * f64::from(half)).collect();

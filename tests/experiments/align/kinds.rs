@@ -1,5 +1,6 @@
-//! Buildings, robots and maps of many kinds: flats, offices, corridors, halls, warehouses, campuses, and buildings whose parts
-//! are alike; lidars of 4 to 30 m and depth cameras; specks, deformations and moved furniture; cells of 2 to 25 cm.
+//! Buildings, robots and maps of many kinds: flats, offices, corridors, halls, warehouses, campuses, and buildings
+//! whose parts are alike; lidars of 4 to 30 m and depth cameras; specks, deformations and moved furniture; cells of 2
+//! to 25 cm.
 
 use rand::{Rng, RngExt};
 

@@ -39,7 +39,8 @@ pub(super) struct AlignArgs {
     /// Pairs in buildings whose parts are alike.
     #[arg(long, default_value_t = 50)]
     alike: u64,
-    /// Pairs of one building of any kind: flats, offices, corridors, halls, warehouses, campuses, symmetric and repeated ones.
+    /// Pairs of one building of any kind: flats, offices, corridors, halls, warehouses, campuses, symmetric and
+    /// repeated ones.
     #[arg(long, default_value_t = 400)]
     varied: u64,
     /// Each first robot of these is also paired with the second robot of so many of the buildings that follow.

@@ -111,9 +111,9 @@ pub(super) fn merge(pair: &PairWorld, pipeline: &str, registry: &Registry) -> Re
     Ok(robots.into_iter().map(trial).collect())
 }
 
-/// Whether the relative pose of two robots is right: places that both have seen are within 0.5 m of each other in the median,
-/// and nine of ten within 1 m. Where the truth lists none, the second robot is within 0.5 m and 3 degrees of its true pose,
-/// as drift turns maps by that.
+/// Whether the relative pose of two robots is right: places that both have seen are within 0.5 m of each other in the
+/// median, and nine of ten within 1 m. Where the truth lists none, the second robot is within 0.5 m and 3 degrees of
+/// its true pose, as drift turns maps by that.
 fn is_place_right(evaluation: &Evaluation) -> bool {
     let is_near =
         |robot: &RobotResult| robot.error_m.is_some_and(|m| m < 0.5) && robot.error_deg.is_some_and(|deg| deg < 3.0);

@@ -125,8 +125,8 @@ pub(super) fn varied_unrelated(first: &PairWorld, second: &PairWorld) -> Result<
     of_two(&first.world, &second.world, format!("{} and {}", first.name, second.name))
 }
 
-/// Two robots in a building whose parts are alike: half of them symmetric, half of them with one room again and again, and
-/// half of each without furniture.
+/// Two robots in a building whose parts are alike: half of them symmetric, half of them with one room again and again,
+/// and half of each without furniture.
 pub(super) fn alike(seeds: Seeds, number: u64, registry: &Registry) -> Result<PairWorld> {
     let seed = seeds.seed(ALIKE, number);
     let mut random = ChaCha8Rng::seed_from_u64(seed);

@@ -1,11 +1,12 @@
 //! How exactly, and how fast, the direction of a map's walls is found: section 5.1 of Tsardoulias et al.
 //!
-//! The paper's map has 700 x 600 cells of 0.02 m and walls at -45 degrees, and was searched 1000 times. Here a map is an
-//! office drawn at an angle that is known exactly ([`draw_map`](gridweave_stages::simulator::draw_map)), in five styles
-//! of walls. A run goes from the grid to the direction: `line_extractor`, then the first half of `quadrant_classifier`.
+//! The paper's map has 700 x 600 cells of 0.02 m and walls at -45 degrees, and was searched 1000 times. Here a map is
+//! an office drawn at an angle that is known exactly ([`draw_map`](gridweave_stages::simulator::draw_map)), in five
+//! styles of walls. A run goes from the grid to the direction: `line_extractor`, then the first half of
+//! `quadrant_classifier`.
 //!
-//! Two things are random: the map, and what the stage draws. Most runs have a map and a stage seed of their own. That one
-//! map is searched with many stage seeds, as in the paper, shows how much the stage itself adds.
+//! Two things are random: the map, and what the stage draws. Most runs have a map and a stage seed of their own. That
+//! one map is searched with many stage seeds, as in the paper, shows how much the stage itself adds.
 
 mod measure;
 mod report;

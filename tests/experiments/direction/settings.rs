@@ -32,8 +32,8 @@ impl Settings {
     }
 
     /// The paper's values (section 4.1). It gives none for the size of the sub-sample, the limit of iterations, and the
-    /// two limits of merging; the first two are chosen for a time like that of the shipped parameters, the others are those
-    /// that ship.
+    /// two limits of merging; the first two are chosen for a time like that of the shipped parameters, the others are
+    /// those that ship.
     pub(super) fn paper() -> Self {
         let lines = LineExtractorParameters {
             sampling: Sampling::Uniform,

@@ -6,8 +6,8 @@
 //!   other, as a reflection in both or a labelled box that was carried away might have it. The tags' distance and the
 //!   directions agree. Wherever the merge is right, the walls have mended it.
 //! - **unrelated**: robots of two buildings in which two, three or five tags bear the same ids.
-//! - **look-alike**: robots of two buildings in which two tags bear the same ids, are as far apart, and are turned against
-//!   each other as the walls are. Only the walls can distinguish them; few unrelated pairs get so far.
+//! - **look-alike**: robots of two buildings in which two tags bear the same ids, are as far apart, and are turned
+//!   against each other as the walls are. Only the walls can distinguish them; few unrelated pairs get so far.
 //!
 //! A pair is wrong if it is so in the end, and "ever wrong" if it was merged wrongly at any time of the run.
 

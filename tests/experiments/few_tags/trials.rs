@@ -58,8 +58,8 @@ pub(super) fn two_tags(buildings: &[Building], choices: usize) -> Vec<Trial<'_>>
     trials
 }
 
-/// In each pair of a building's robots, one choice of two tags that both have located, and that are `metres` away for the
-/// second robot, both in one of the directions of its walls: each direction in turn.
+/// In each pair of a building's robots, one choice of two tags that both have located, and that are `metres` away for
+/// the second robot, both in one of the directions of its walls: each direction in turn.
 pub(super) fn moved_alike(buildings: &[Building], metres: f64) -> Vec<Trial<'_>> {
     let mut trials = Vec::new();
     for building in buildings.iter().filter(|building| building.related) {
@@ -88,8 +88,8 @@ pub(super) fn moved_alike(buildings: &[Building], metres: f64) -> Vec<Trial<'_>>
     trials
 }
 
-/// Each two buildings in either order. Logs whose robots come from two buildings do not say which these are, and are left
-/// out.
+/// Each two buildings in either order. Logs whose robots come from two buildings do not say which these are, and are
+/// left out.
 fn strangers(buildings: &[Building]) -> impl Iterator<Item = (&Building, &Building)> {
     let related = || buildings.iter().filter(|building| building.related);
     related()

@@ -75,7 +75,8 @@ impl Example {
         self.places.iter().filter(|place| !place.is_refused)
     }
 
-    /// Whether a place is the right one, but none exactly: which place it is can be learnt from that no more than that it is none.
+    /// Whether a place is the right one, but none exactly: which place it is can be learnt from that no more than that
+    /// it is none.
     pub(super) fn is_inexact(&self) -> bool {
         let has = |closeness: Closeness| self.places.iter().any(|place| place.closeness == closeness);
         has(Closeness::Near) && !has(Closeness::Right)

@@ -6,10 +6,11 @@ use anyhow::{Result, bail};
 use gridweave_stages::registration::judgement::{COUNT, Term, posterior};
 use nalgebra::{DMatrix, DVector};
 
-/// The precision of the prior of a weight, in units of the spread of its term: so small that it only holds weights that the
-/// data leave open.
+/// The precision of the prior of a weight, in units of the spread of its term: so small that it only holds weights that
+/// the data leave open.
 const REGULARISATION: f64 = 1.0;
-/// Simulated pairs that belong together weigh half as much in all as recorded ones: they only stand for what is not recorded.
+/// Simulated pairs that belong together weigh half as much in all as recorded ones: they only stand for what is not
+/// recorded.
 const SIMULATED: f64 = 0.5;
 /// Pairs of buildings whose parts are alike weigh a twentieth in all: such buildings are rare, and all are simulated.
 const PARTS_ALIKE: f64 = 0.05;
@@ -52,7 +53,8 @@ impl Linear {
     }
 }
 
-/// The weight of a choice, and for each alternative its scaled terms behind a 1 for the intercept, and whether it is right.
+/// The weight of a choice, and for each alternative its scaled terms behind a 1 for the intercept, and whether it is
+/// right.
 type Scaled = (f64, Vec<(DVector<f64>, bool)>);
 
 /// Newton's method on the terms that are kept, scaled to a spread of one, with the expected information.

@@ -1,9 +1,10 @@
 //! Fits the weights of the judgement (`stages/registration/judgement/weights.rs`) to pairs of maps.
 //!
-//! Each pair is searched, refined and compared on the way that ships. A conditional logit over its places, and none of them,
-//! is fitted to which is right, and another one to which of a place and its aliases is. Pairs of different buildings weigh as
-//! much together as pairs that belong together: the probability is that of a pair of which either is as likely. What the
-//! tables and curves show is cross-validated by place: no place is judged by weights that it took part in.
+//! Each pair is searched, refined and compared on the way that ships. A conditional logit over its places, and none of
+//! them, is fitted to which is right, and another one to which of a place and its aliases is. Pairs of different
+//! buildings weigh as much together as pairs that belong together: the probability is that of a pair of which either is
+//! as likely. What the tables and curves show is cross-validated by place: no place is judged by weights that it took
+//! part in.
 
 mod cross_validation;
 mod examples;

@@ -1,5 +1,5 @@
-//! Whether a certainty means what it says: of the places that are stated with a certainty of 0.7, the tag should be in the
-//! window in 7 of 10.
+//! Whether a certainty means what it says: of the places that are stated with a certainty of 0.7, the tag should be in
+//! the window in 7 of 10.
 
 use super::super::plot::{Axis, Plot, Series, Shape};
 use super::super::results::Results;

@@ -1,8 +1,8 @@
 //! How certain a tag's place is, and how wrong (Tsardoulias et al., section 3 and figure 4).
 //!
-//! A robot drives 3 m past a tag, straight, along a quarter of a circle, or once round a small circle, and reads it every
-//! centimetre. The tag is anywhere within range. The paper's likelihood is compared with the localizer's defaults, then
-//! readings and poses are made worse.
+//! A robot drives 3 m past a tag, straight, along a quarter of a circle, or once round a small circle, and reads it
+//! every centimetre. The tag is anywhere within range. The paper's likelihood is compared with the localizer's
+//! defaults, then readings and poses are made worse.
 
 mod calibration;
 mod drive;

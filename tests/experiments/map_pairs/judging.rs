@@ -47,7 +47,8 @@ pub(super) fn judge_maps(a: &MapOfBuilding, b: &MapOfBuilding) -> Judged {
     outcome.unwrap_or_else(|problem| Judged::refused(&problem))
 }
 
-/// The places that are judged for two maps, and the aliases of the most probable one if it is more probable than `likely`.
+/// The places that are judged for two maps, and the aliases of the most probable one if it is more probable than
+/// `likely`.
 pub(crate) fn candidates_of(a: &MapOfBuilding, b: &MapOfBuilding, likely: f64) -> (Vec<Candidate>, Vec<Alias>) {
     let parameters = RegistrationParameters::default();
     let RegistrationParameters { search, icp, judgement } = &parameters;

@@ -206,7 +206,8 @@ impl SimulatedPair {
     }
 }
 
-/// The robots of so many simulated worlds, of one kind if that is named. Worlds in which robots find no way are left out.
+/// The robots of so many simulated worlds, of one kind if that is named. Worlds in which robots find no way are left
+/// out.
 pub(crate) fn simulated_pairs(count: u64, kind: Option<&str>, seeds: Seeds, registry: &Registry) -> Vec<SimulatedPair> {
     let is_wanted = |number: &u64| kind.is_none_or(|kind| Kind::of(*number).name() == kind);
     // A kind that there is not makes no worlds, and must not be looked for without end.

@@ -1,7 +1,8 @@
 //! Merging pairs of map files by the maps alone, with the stages of `map_merge`: cleaned, searched, registered, judged.
 //!
 //! - **Pairs with a truth**: those that `pairs.json` of a folder names.
-//! - **Pairs of different buildings**: parts of two maps, each cut out and turned at random; all that are merged are wrong.
+//! - **Pairs of different buildings**: parts of two maps, each cut out and turned at random; all that are merged are
+//!   wrong.
 //! - **Simulated ones**: of two worlds of any kind.
 //!
 //! No log is written, so that thousands of pairs are done in an hour.
@@ -26,9 +27,9 @@ use std::path::PathBuf;
 /// Arguments of the experiment `map-pairs`.
 #[derive(Debug, Args)]
 pub(super) struct MapPairsArgs {
-    /// Folders of map files (YAML), with or without a `pairs.json`, and of logs (MCAP), with or without a `LOG.truth.json`
-    /// that names common places, of which the last maps are taken. What two names have in common up to the first `_` or `-`
-    /// is one building, which is never paired with itself.
+    /// Folders of map files (YAML), with or without a `pairs.json`, and of logs (MCAP), with or without a
+    /// `LOG.truth.json` that names common places, of which the last maps are taken. What two names have in common up to
+    /// the first `_` or `-` is one building, which is never paired with itself.
     folders: Vec<PathBuf>,
     /// Pairs of parts of maps of different buildings.
     #[arg(long, default_value_t = 1000)]

@@ -8,8 +8,8 @@ use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A hypothesis within this of the truth, metres, is the right one, but not exact: maps that drift differ so much. Hypotheses at
-/// similar places are farther from each other.
+/// A hypothesis within this of the truth, metres, is the right one, but not exact: maps that drift differ so much.
+/// Hypotheses at similar places are farther from each other.
 pub(crate) const NEAR: f64 = 1.5;
 /// And turned by less than this, degrees.
 pub(crate) const NEAR_DEGREES: f64 = 5.0;
@@ -38,8 +38,8 @@ pub(crate) struct Pair {
 struct Truth {
     /// In map b and in map a: x and y of each, metres.
     common: Vec<[f64; 4]>,
-    /// Residuals of the best rigid transform, which the deformation of the maps causes: the median and the 90th percentile,
-    /// metres.
+    /// Residuals of the best rigid transform, which the deformation of the maps causes: the median and the 90th
+    /// percentile, metres.
     #[serde(default)]
     rigid_median: f64,
     #[serde(default)]
@@ -57,8 +57,8 @@ struct PairOfFiles {
     truth: Truth,
 }
 
-/// The pairs that a folder has a truth of: those of its `pairs.json`, and the last maps of the first two robots of each log whose
-/// `LOG.truth.json` names common places. None if it has neither.
+/// The pairs that a folder has a truth of: those of its `pairs.json`, and the last maps of the first two robots of each
+/// log whose `LOG.truth.json` names common places. None if it has neither.
 pub(crate) fn pairs(folder: &Path) -> Result<Vec<Pair>> {
     let mut pairs = Vec::new();
     let listed = folder.join("pairs.json");
@@ -112,8 +112,8 @@ impl Pair {
         self.truth.common.is_empty()
     }
 
-    /// Whether `T_a_b` aligns the common places within 0.5 m of each other in the median and nine of ten within 1 m, beyond
-    /// what the best rigid transform leaves.
+    /// Whether `T_a_b` aligns the common places within 0.5 m of each other in the median and nine of ten within 1 m,
+    /// beyond what the best rigid transform leaves.
     pub(crate) fn is_right(&self, transform_a_b: &Pose2) -> bool {
         let Truth { rigid_median, rigid_p90, .. } = &self.truth;
         let errors = self.errors(transform_a_b);

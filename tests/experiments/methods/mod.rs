@@ -5,11 +5,11 @@
 //! - The **mean square error** of a robot is the mean of `|T_found p - T_true p|^2` over the centres p of the occupied
 //!   cells of the robot's last map: in square metres, and in the squared cell width of that map. The paper's is that
 //!   between the points of the second map as transformed and as they should lie.
-//! - How far the walls of the two maps lie apart, at the found place and at the true one, says whose error it is: where a
-//!   drifting robot has bent its map, walls do not lie on walls at the true place either.
-//! - The time of **one alignment** is what the paper measures: from the last maps of a pair and the tags that they have in
-//!   common to the transform. The busy time of a whole run is all that its stages did: reading the log, localizing the
-//!   tags, an alignment for each of the many times that a map or a tag changed, fusing and writing.
+//! - How far the walls of the two maps lie apart, at the found place and at the true one, says whose error it is: where
+//!   a drifting robot has bent its map, walls do not lie on walls at the true place either.
+//! - The time of **one alignment** is what the paper measures: from the last maps of a pair and the tags that they have
+//!   in common to the transform. The busy time of a whole run is all that its stages did: reading the log, localizing
+//!   the tags, an alignment for each of the many times that a map or a tag changed, fusing and writing.
 
 mod one_alignment;
 mod record;
@@ -32,8 +32,8 @@ use std::path::{Path, PathBuf};
 /// The pipelines of the paper's methods 1, 2 and 3.
 const METHODS: [&str; 3] = ["tag_only", "tag_direction", "tag_merge"];
 
-/// The paper's conditions as far as it states them: cells of 0.02 m in 14 x 12 m, tags that are read within 3 m and with
-/// a deviation of 5 cm. The rest is the simulator's default.
+/// The paper's conditions as far as it states them: cells of 0.02 m in 14 x 12 m, tags that are read within 3 m and
+/// with a deviation of 5 cm. The rest is the simulator's default.
 const WORLD: [&str; 6] = ["robots=2", "width=14", "height=12", "resolution=[0.02]", "tag_reach=3", "tag_noise=0.05"];
 
 /// Arguments of the experiment `methods`.
@@ -42,8 +42,8 @@ pub(super) struct MethodsArgs {
     /// How many simulated worlds of each kind, each with its own seed.
     #[arg(long, default_value_t = 50)]
     seeds: u64,
-    /// A folder with recorded logs to merge as well: LOG.mcap, each with its LOG.truth.json. A log without a truth counts
-    /// as one of robots that have nothing to do with each other.
+    /// A folder with recorded logs to merge as well: LOG.mcap, each with its LOG.truth.json. A log without a truth
+    /// counts as one of robots that have nothing to do with each other.
     #[arg(long, value_name = "FOLDER")]
     logs: Option<PathBuf>,
     /// How often each alignment is done again for its time, which is the median.

@@ -123,7 +123,8 @@ impl Aligner {
     }
 }
 
-/// What a stage makes, if the pipeline has it, and the processor time that it takes; none for a stage that is not there.
+/// What a stage makes, if the pipeline has it, and the processor time that it takes; none for a stage that is not
+/// there.
 fn timed<P, T>(parameters: Option<&P>, work: impl FnOnce(&P) -> T) -> (Option<T>, Duration) {
     let Some(parameters) = parameters else { return (None, Duration::ZERO) };
     let start = ProcessorTime::now();

@@ -156,8 +156,8 @@ impl Record {
     }
 }
 
-/// The mean of the squared distances between where two transforms place the occupied cells of a map, square metres; 0 if
-/// there are none.
+/// The mean of the squared distances between where two transforms place the occupied cells of a map, square metres; 0
+/// if there are none.
 fn mean_square_distance(map: &Grid<'_>, one: &Pose2, other: &Pose2) -> f64 {
     let (mut sum, mut count) = (0.0, 0usize);
     for cell in map.occupied() {

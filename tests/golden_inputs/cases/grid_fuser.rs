@@ -112,9 +112,9 @@ pub(super) fn place(log: &mut LogBuilder, seconds: f64, placed: &[(&str, Pose2)]
 
 /// The 25 points 98 to 102 squared, turned by 30 degrees about (200, 200) and moved to (300, 300).
 ///
-/// The paper's points are whole numbers, and a grid's are the middles of its cells. Values of 10 and 20 in turn distinguish a
-/// cell that was carried over from a hole that was filled with a mean. The reference's map, one cell that lies apart,
-/// makes the cells of the output those of whole numbers.
+/// The paper's points are whole numbers, and a grid's are the middles of its cells. Values of 10 and 20 in turn
+/// distinguish a cell that was carried over from a hole that was filled with a mean. The reference's map, one cell that
+/// lies apart, makes the cells of the output those of whole numbers.
 fn equations_14_and_15(log: &mut LogBuilder) {
     let cells: Vec<i8> = (0..25).map(|index| if index % 2 == 0 { 10 } else { 20 }).collect();
     log.map(1.0, "robot1", &grid(1, &[40]).at(255.0, 163.0, 0.0));

@@ -58,8 +58,8 @@ fn every_kind(log: &mut LogBuilder) {
     log.raw(2.4, "/robot3/map", "std_msgs/msg/String", STRING);
 }
 
-/// A map whose cells change part by part, among them parts that do not fit; one that shrinks and goes on; and a map of another
-/// robot, without updates.
+/// A map whose cells change part by part, among them parts that do not fit; one that shrinks and goes on; and a map of
+/// another robot, without updates.
 fn map_updates(log: &mut LogBuilder) {
     let update = |log: &mut LogBuilder, seconds, [x, y]: [i32; 2], [width, height]: [u32; 2], cell: i8| {
         let data = vec![cell as u8; (width * height) as usize];
@@ -76,8 +76,8 @@ fn map_updates(log: &mut LogBuilder) {
     update(log, 6.6, [3, 0], [2, 3], 100);
 }
 
-/// Robots without topics for their poses: one with a chain of transforms, one with odometry in the frame of its map, one with
-/// odometry in another frame.
+/// Robots without topics for their poses: one with a chain of transforms, one with odometry in the frame of its map,
+/// one with odometry in another frame.
 fn no_pose_topic(log: &mut LogBuilder) {
     log.message(0.0, "/tf_static", &transform(0.0, "robot1/base_footprint", "robot1/base_link", 0.25));
     for robot in ["robot1", "robot2", "robot3"] {
@@ -94,8 +94,8 @@ fn no_pose_topic(log: &mut LogBuilder) {
     }
 }
 
-/// Tags in messages of other types: ranges that are named by their frame, and tags that are frames of tf, seen by a camera that
-/// looks to the left.
+/// Tags in messages of other types: ranges that are named by their frame, and tags that are frames of tf, seen by a
+/// camera that looks to the left.
 fn tag_messages(log: &mut LogBuilder) {
     log.map(0.0, "robot1", &TestMap::filled(4, 3, 0.05, 0)).pose(0.0, "robot1", 0.0, 0.0);
     let mount = Transform::from(pose(0.5, 0.0, std::f64::consts::FRAC_PI_2));

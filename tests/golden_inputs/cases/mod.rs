@@ -1,4 +1,5 @@
-//! The made-up inputs of golden cases, a file for each stage kind, and one for those of group mapping, which share their maps.
+//! The made-up inputs of golden cases, a file for each stage kind, and one for those of group mapping, which share
+//! their maps.
 //!
 //! Topics are those of the pipeline `tag_merge`, so that the patterns of a case also match a cut of a log.
 

@@ -165,7 +165,8 @@ fn no_readings(log: &mut LogBuilder) {
     log.uncertain_pose(7.8, "robot1", 0.0, 0.0, 0.0);
 }
 
-/// A straight drive past a tag that a camera sees, with an error that goes round; at the end its range is also measured.
+/// A straight drive past a tag that a camera sees, with an error that goes round; at the end its range is also
+/// measured.
 fn seen_by_a_camera(log: &mut LogBuilder) {
     for (step, place) in line(60).enumerate() {
         let seconds = 0.1 * step as f64;
@@ -184,8 +185,8 @@ fn seen_by_a_camera(log: &mut LogBuilder) {
     log.message(6.0, "/robot1/tag_positions", &nowhere);
 }
 
-/// A straight drive past a tag whose direction is perceived from half a metre ahead, with an error that goes round; one direction
-/// is wrong, and one is no number. Another tag is measured once.
+/// A straight drive past a tag whose direction is perceived from half a metre ahead, with an error that goes round; one
+/// direction is wrong, and one is no number. Another tag is measured once.
 fn bearings_alone(log: &mut LogBuilder) {
     for (step, place) in line(60).enumerate() {
         let seconds = 0.1 * step as f64;

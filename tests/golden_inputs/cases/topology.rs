@@ -1,4 +1,5 @@
-//! Inputs of `topology_extractor` and `topology_matcher`: a map with rooms and doors, and topological maps drawn by hand.
+//! Inputs of `topology_extractor` and `topology_matcher`: a map with rooms and doors, and topological maps drawn by
+//! hand.
 
 use super::Case;
 use super::drawing::{FloorPlan, View};
@@ -46,7 +47,8 @@ fn four_on_seven(log: &mut LogBuilder) {
     log.message(2.0, "/robot2/topology", &drawn("robot2", &four, &[[0, 1], [1, 2], [2, 3]], &truth));
 }
 
-/// A topological map with nodes at places of robot1's map, as a robot draws it whose map lies there at `transform_1_robot`.
+/// A topological map with nodes at places of robot1's map, as a robot draws it whose map lies there at
+/// `transform_1_robot`.
 fn drawn(robot: &str, nodes: &[[f64; 2]], paths: &[[u32; 2]], transform_1_robot: &Pose2) -> TopologicalMap {
     let place = |[x, y]: [f64; 2]| transform_1_robot.inverse_transform_point(&Point2::new(x, y));
     let node =

@@ -33,8 +33,8 @@ pub(crate) struct Database {
 }
 
 impl Database {
-    /// Opens the database at `path` and determines its layout. A compressed one was decompressed to `decompressed`, whose name
-    /// is removed.
+    /// Opens the database at `path` and determines its layout. A compressed one was decompressed to `decompressed`,
+    /// whose name is removed.
     ///
     /// # Errors
     /// The cause, if no message can be read.

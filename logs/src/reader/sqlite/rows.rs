@@ -42,8 +42,8 @@ impl Place {
     }
 }
 
-/// Scans all rows, and adds runs of them to the layout as blocks. `row_number` is the name of their numbers; the rows `torn`,
-/// ascending, are incomplete; the messages of the others take at most `room` bytes: the length of the database.
+/// Scans all rows, and adds runs of them to the layout as blocks. `row_number` is the name of their numbers; the rows
+/// `torn`, ascending, are incomplete; the messages of the others take at most `room` bytes: the length of the database.
 pub(super) fn survey(
     connection: &Connection,
     row_number: &str,
@@ -164,8 +164,8 @@ impl Runs<'_> {
 }
 
 impl Rows {
-    /// The messages of the rows as MCAP records, and the number of unreadable ones. `row_number` is the name of their numbers; the
-    /// rows `torn`, ascending, are incomplete; `channels` are the channel numbers of the topics.
+    /// The messages of the rows as MCAP records, and the number of unreadable ones. `row_number` is the name of their
+    /// numbers; the rows `torn`, ascending, are incomplete; `channels` are the channel numbers of the topics.
     pub(super) fn contents(
         &self,
         connection: &Connection,

@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 /// The name under which rosbag2 stores the bag's metadata.
 const DESCRIPTION: (&str, &str) = ("rosbag2", "serialized_metadata");
 
-/// Adds the channels of all topics to the layout. Returns their channel numbers, from 1, by topic id. All texts together take at
-/// most `room` bytes: the length of the database, in which each is stored.
+/// Adds the channels of all topics to the layout. Returns their channel numbers, from 1, by topic id. All texts
+/// together take at most `room` bytes: the length of the database, in which each is stored.
 ///
 /// # Errors
 /// The cause, if the database is not a bag.

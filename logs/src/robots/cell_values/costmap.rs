@@ -33,9 +33,10 @@ pub(super) fn obstacles_are_inflated(width: usize, cells: &[i8]) -> bool {
     known > 0 && inflated as f64 >= COSTMAP_SHARE * known as f64
 }
 
-/// The cells of a costmap without the costs around obstacles: free on the side from which the cost falls to that of free space,
-/// unknown on the side from which it falls to unknown cells. The sides are found by flooding the costs from both (the watershed
-/// of Meyer, "Topographic distance and watershed lines", 1994); obstacles are the ridges between them.
+/// The cells of a costmap without the costs around obstacles: free on the side from which the cost falls to that of
+/// free space, unknown on the side from which it falls to unknown cells. The sides are found by flooding the costs from
+/// both (the watershed of Meyer, "Topographic distance and watershed lines", 1994); obstacles are the ridges between
+/// them.
 pub(super) fn without_costs(width: usize, cells: &[i8]) -> Vec<i8> {
     let is_cost = |value: i8| (1..LETHAL).contains(&value);
     let mut read: Vec<i8> = cells.iter().map(|value| if is_cost(*value) { i8::MIN } else { *value }).collect();

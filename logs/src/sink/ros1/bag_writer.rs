@@ -24,8 +24,8 @@ const LARGEST: usize = 1 << 30;
 
 /// Writes a ROS 1 bag (format 2.0), chunked and indexed.
 ///
-/// The file is written as `NAME.part` and renamed when it is [finished](Self::finish). Until then it has no index, and so
-/// has a bag whose run has failed: programs of ROS say of it that it is not indexed, and `rosbag reindex` mends it.
+/// The file is written as `NAME.part` and renamed when it is [finished](Self::finish). Until then it has no index, and
+/// so has a bag whose run has failed: programs of ROS say of it that it is not indexed, and `rosbag reindex` mends it.
 pub(in crate::sink) struct BagWriter {
     path: PathBuf,
     output: OutputFile,
@@ -65,8 +65,8 @@ struct ChunkInfo {
 }
 
 impl BagWriter {
-    /// Starts a bag at `path`. When it is complete, it replaces a file of that name. Of the compressions, `Zstd` becomes
-    /// LZ4, as bags know no other that is fast.
+    /// Starts a bag at `path`. When it is complete, it replaces a file of that name. Of the compressions, `Zstd`
+    /// becomes LZ4, as bags know no other that is fast.
     ///
     /// # Errors
     /// Another program writes it, it is a folder or a device, or the file system does not allow it.
@@ -94,8 +94,8 @@ impl BagWriter {
         self.output.keep(is_kept);
     }
 
-    /// The number of a channel. A channel that was added before keeps its number. The inner error says why a bag cannot hold
-    /// its messages.
+    /// The number of a channel. A channel that was added before keeps its number. The inner error says why a bag cannot
+    /// hold its messages.
     pub(in crate::sink) fn channel(&mut self, channel: &Channel) -> Result<Result<u16, String>, LogWriteError> {
         if let Some(number) = self.connections.iter().position(|known| known.channel == *channel) {
             return self.number(number).map(Ok);
@@ -199,8 +199,8 @@ impl BagWriter {
         self.append(&bytes)
     }
 
-    /// Ends the bag, and returns its path. A complete one gets an index, and replaces a file of its name. An incomplete one
-    /// has none, and replaces no file: if there is one, it stays at `NAME.part`.
+    /// Ends the bag, and returns its path. A complete one gets an index, and replaces a file of its name. An incomplete
+    /// one has none, and replaces no file: if there is one, it stays at `NAME.part`.
     ///
     /// # Errors
     /// The file cannot be written or renamed.
@@ -276,8 +276,8 @@ fn connection_record(number: u32, channel: &Channel, of: &Ros1Type) -> Vec<u8> {
     record
 }
 
-/// Compresses a chunk in the only form of LZ4 frames that `roslz4` reads: independent blocks, a checksum of the contents,
-/// and no other.
+/// Compresses a chunk in the only form of LZ4 frames that `roslz4` reads: independent blocks, a checksum of the
+/// contents, and no other.
 fn lz4(bytes: &[u8]) -> io::Result<Vec<u8>> {
     let mut encoder = lz4::EncoderBuilder::new()
         .block_size(lz4::BlockSize::Max1MB)

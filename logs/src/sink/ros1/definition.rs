@@ -1,7 +1,7 @@
 //! Definitions of ROS 1 types, from those of ROS 2.
 //!
-//! A ROS 1 program takes a message only if its type has the same MD5 sum as its own, so types that both versions have get
-//! their ROS 1 definition: most differ in nothing but the names of times and headers, the others are in
+//! A ROS 1 program takes a message only if its type has the same MD5 sum as its own, so types that both versions have
+//! get their ROS 1 definition: most differ in nothing but the names of times and headers, the others are in
 //! `logs/ros1_msg`.
 
 use crate::dynamic::sections;

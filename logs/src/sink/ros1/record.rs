@@ -38,8 +38,8 @@ pub(super) fn push_record(bytes: &mut Vec<u8>, header: &HeaderBytes, data: &[u8]
     bytes.extend_from_slice(data);
 }
 
-/// The bytes of a time in nanoseconds: seconds, and nanoseconds of the second. Times after the year 2106 become the last
-/// one.
+/// The bytes of a time in nanoseconds: seconds, and nanoseconds of the second. Times after the year 2106 become the
+/// last one.
 pub(super) fn time_bytes(time: u64) -> [u8; 8] {
     const SECOND: u64 = 1_000_000_000;
     let (seconds, rest) = match u32::try_from(time / SECOND) {

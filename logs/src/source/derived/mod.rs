@@ -59,8 +59,8 @@ impl Derived {
         self.poses.needs_frames() || self.scans.needs_frames() || self.tags.needs_frames()
     }
 
-    /// Learns transforms of the log before they come. Those that are not static show how a lidar is mounted, and where the frame of
-    /// poses is in that of the map until the first of them comes; all else in them moves.
+    /// Learns transforms of the log before they come. Those that are not static show how a lidar is mounted, and where
+    /// the frame of poses is in that of the map until the first of them comes; all else in them moves.
     pub(super) fn learn_ahead(&mut self, prefix: &str, is_static: bool, transforms: &TFMessage) {
         self.scans.learn_transforms(prefix, is_static, transforms);
         self.poses.learn_pose_frames(prefix, is_static, transforms);

@@ -18,7 +18,8 @@ pub(super) struct DerivedScans {
     unmounted: Option<BTreeMap<(String, String), LogTime>>,
 }
 
-/// How long a live source waits for the mount of a lidar, seconds of log time. Static transforms are sent to whoever joins, at once.
+/// How long a live source waits for the mount of a lidar, seconds of log time. Static transforms are sent to whoever
+/// joins, at once.
 const MOUNT_TIMEOUT: f64 = 5.0;
 
 impl DerivedScans {
@@ -27,8 +28,8 @@ impl DerivedScans {
         Self { scans: roles.scanned().next().map(|_| Scans::new(base_frame, lidars.clone())), lidars, unmounted: None }
     }
 
-    /// Tracks the mounting poses of lidars before any channel with scans is known, in a live run. A scan may come before the mount of
-    /// its lidar, and is left out.
+    /// Tracks the mounting poses of lidars before any channel with scans is known, in a live run. A scan may come
+    /// before the mount of its lidar, and is left out.
     pub(super) fn expect_sensors(&mut self, base_frame: Option<&str>) {
         self.unmounted.get_or_insert_default();
         self.scans.get_or_insert_with(|| Scans::new(base_frame, self.lidars.clone()));

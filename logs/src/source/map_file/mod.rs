@@ -29,8 +29,8 @@ pub struct MapFileSourceParameters {
     /// and where no cell reaches `occupied_thresh`, the darkest cells are occupied. Set by `--literal-thresholds` on
     /// the command line.
     pub literal_thresholds: bool,
-    /// Side of a cell of a robot's map, metres, instead of the resolution in its file. The position of the origin stays.
-    /// Set by `--resolution` on the command line.
+    /// Side of a cell of a robot's map, metres, instead of the resolution in its file. The position of the origin
+    /// stays. Set by `--resolution` on the command line.
     pub resolutions: BTreeMap<String, f64>,
 }
 

@@ -8,7 +8,8 @@ use std::collections::{BTreeMap, VecDeque};
 /// The maximum size of a batch with several messages, bytes.
 const BATCH_SIZE: usize = 128 * 1024;
 
-/// The limits of the queue, which always keeps the last message. They are small: a tap is for current messages, not old ones.
+/// The limits of the queue, which always keeps the last message. They are small: a tap is for current messages, not old
+/// ones.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
     pub(super) messages: usize,

@@ -28,11 +28,11 @@ pub(super) struct TapParameters {
     pub(super) sender: String,
     /// The link of its run: STAGE.PORT, or STAGE if it has only one output.
     pub(super) link: String,
-    /// The addresses that the senders connect to, where a `bridge_source` or a router of Zenoh listens, as `tcp/HOST:PORT` or
-    /// `tls/HOST:PORT`.
+    /// The addresses that the senders connect to, where a `bridge_source` or a router of Zenoh listens, as
+    /// `tcp/HOST:PORT` or `tls/HOST:PORT`.
     pub(super) connect: Vec<String>,
-    /// The authority (PEM) that must have signed the certificate of the listening end, for `tls/HOST:PORT`; the default is the
-    /// public authorities of browsers.
+    /// The authority (PEM) that must have signed the certificate of the listening end, for `tls/HOST:PORT`; the default
+    /// is the public authorities of browsers.
     pub(super) authority: Option<PathBuf>,
     /// The certificate (PEM) of this end, if one is required.
     pub(super) certificate: Option<PathBuf>,

@@ -49,8 +49,8 @@ impl Drop for Viewer {
     }
 }
 
-/// Sessions with the link `slam.map` and the link `slam.pose`, of which nothing is known, and answers what it was asked by
-/// the number of the question.
+/// Sessions with the link `slam.map` and the link `slam.pose`, of which nothing is known, and answers what it was asked
+/// by the number of the question.
 fn sessions(limits: Limits) -> (TapSessions<u32>, SharedLink) {
     let link = Arc::new(Mutex::new(Link { is_made: true, ..Default::default() }));
     let named = |output: &str| RunLink { stage: "slam".into(), output: output.into(), ..Default::default() };

@@ -44,7 +44,8 @@ impl<'a> Cursor<'a> {
         Some((i64::from(high) << 32) | i64::from(low))
     }
 
-    /// A text of CDR: its length with the zero at its end, and its bytes; then what aligns the next value to four bytes.
+    /// A text of CDR: its length with the zero at its end, and its bytes; then what aligns the next value to four
+    /// bytes.
     pub(crate) fn text(&mut self) -> Option<String> {
         let length = self.u32()? as usize;
         let bytes = self.take(length)?;

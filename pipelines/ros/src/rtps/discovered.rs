@@ -9,7 +9,8 @@ use super::policies::Policies;
 use std::net::SocketAddrV4;
 use std::time::Duration;
 
-/// The endpoints for discovery that are there: participants, publications and subscriptions, a writer and a reader for each.
+/// The endpoints for discovery that are there: participants, publications and subscriptions, a writer and a reader for
+/// each.
 const ENDPOINTS: u32 = 0b11_1111;
 
 /// A participant.

@@ -134,8 +134,8 @@ impl Network {
         }
     }
 
-    /// Waits for something to read, at most so long or until [`wake`](Self::wake), and calls `take` with each datagram and from
-    /// where it has come. `buffer` holds the largest.
+    /// Waits for something to read, at most so long or until [`wake`](Self::wake), and calls `take` with each datagram
+    /// and from where it has come. `buffer` holds the largest.
     pub(crate) fn receive(&self, longest: Duration, buffer: &mut [u8], mut take: impl FnMut(&[u8], Ipv4Addr)) {
         let mut waited = vec![
             PollFd::new(&self.wake[1], PollFlags::IN),

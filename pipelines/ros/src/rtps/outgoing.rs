@@ -5,8 +5,8 @@ use super::message::Message;
 use std::net::SocketAddrV4;
 use std::sync::Arc;
 
-/// A sample that is larger is sent in fragments of this size, bytes. What fits into few packets of Ethernet is lost less, and sent
-/// again at less cost, than the largest that UDP takes.
+/// A sample that is larger is sent in fragments of this size, bytes. What fits into few packets of Ethernet is lost
+/// less, and sent again at less cost, than the largest that UDP takes.
 pub(crate) const FRAGMENT_SIZE: u16 = 8192;
 
 /// A sample of a writer.

@@ -25,7 +25,8 @@ const FIRST_ANNOUNCEMENTS: u32 = 10;
 const LEASE: Duration = Duration::from_secs(20);
 /// The largest datagram, bytes.
 const LARGEST_DATAGRAM: usize = 65536;
-/// Number of fragments that are sent at a time, and the pause after these: the buffers of a reader's system may hold no more.
+/// Number of fragments that are sent at a time, and the pause after these: the buffers of a reader's system may hold no
+/// more.
 const BURST: usize = 8;
 const PAUSE: Duration = Duration::from_micros(200);
 /// Longest time at the end for readers to acknowledge what they lack.

@@ -15,8 +15,8 @@ use std::time::{Duration, Instant};
 /// A writer that says nothing is asked again, in ever longer intervals from the first to the longest.
 const FIRST_QUESTION: Duration = Duration::from_millis(100);
 const LONGEST_QUESTION: Duration = Duration::from_secs(5);
-/// Fragments that do not come on are asked for after this time, and then in ever longer intervals up to the longest. The heartbeats
-/// of some writers are seconds apart.
+/// Fragments that do not come on are asked for after this time, and then in ever longer intervals up to the longest.
+/// The heartbeats of some writers are seconds apart.
 const STALL: Duration = Duration::from_millis(20);
 const LONGEST_STALL: Duration = Duration::from_secs(1);
 /// So many samples wait for those before them. Further ones are asked for again.
@@ -256,8 +256,8 @@ impl MatchedWriter {
         samples
     }
 
-    /// What asks a writer what it has. The specification lets it begin with the number 1; Fast DDS answers at once if it begins with 0,
-    /// and with 1 when its next heartbeat is due, after three seconds. So both are asked in turn.
+    /// What asks a writer what it has. The specification lets it begin with the number 1; Fast DDS answers at once if
+    /// it begins with 0, and with 1 when its next heartbeat is due, after three seconds. So both are asked in turn.
     fn ask(&mut self, own: Guid, writer: Guid) -> Outgoing {
         self.requests = self.requests.wrapping_add(1);
         let nothing = NumberSet::new(i64::from(self.requests.is_multiple_of(2)), []);

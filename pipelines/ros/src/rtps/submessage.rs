@@ -23,8 +23,8 @@ pub(crate) struct Submessage<'a> {
 /// What a part of a message says.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Body<'a> {
-    /// A sample. `inline` has parameters beside it, whose values are little-endian if `is_little`; `payload` is its key alone if
-    /// `is_key`.
+    /// A sample. `inline` has parameters beside it, whose values are little-endian if `is_little`; `payload` is its key
+    /// alone if `is_key`.
     Data { sequence: i64, inline: &'a [u8], is_little: bool, is_key: bool, payload: &'a [u8] },
     /// Consecutive fragments of a sample, `count` of them, the first with the number `first` (from 1).
     Fragments { sequence: i64, first: u32, count: u16, fragment_size: u16, sample_size: u32, payload: &'a [u8] },
@@ -38,8 +38,8 @@ pub(crate) enum Body<'a> {
     Gap { start: i64, set: NumberSet },
 }
 
-/// The parts of a message that say something to an endpoint. A part that is not understood is left out, and so is all after one
-/// that is broken.
+/// The parts of a message that say something to an endpoint. A part that is not understood is left out, and so is all
+/// after one that is broken.
 pub(crate) fn submessages(message: &[u8]) -> Vec<Submessage<'_>> {
     let mut parts = Vec::new();
     let Some(source) = message.strip_prefix(MAGIC).and_then(|rest| rest.get(3..15)) else { return parts };

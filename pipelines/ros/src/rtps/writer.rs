@@ -8,12 +8,13 @@ use std::net::SocketAddrV4;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// After a sample that is not acknowledged a heartbeat follows so soon, and then in ever longer intervals up to the longest.
+/// After a sample that is not acknowledged a heartbeat follows so soon, and then in ever longer intervals up to the
+/// longest.
 const FIRST_HEARTBEAT: Duration = Duration::from_millis(50);
 const LONGEST_HEARTBEAT: Duration = Duration::from_secs(1);
 
-/// What is sent again is followed by a heartbeat at once, but no more often than this: where samples of some size never arrive, no
-/// more is sent than that.
+/// What is sent again is followed by a heartbeat at once, but no more often than this: where samples of some size never
+/// arrive, no more is sent than that.
 const REPAIR_INTERVAL: Duration = Duration::from_millis(10);
 
 /// A writer.

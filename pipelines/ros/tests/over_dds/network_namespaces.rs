@@ -1,5 +1,5 @@
-//! Robots on one machine and the merge on another, each in a network namespace of its own: they find each other by multicast, as ROS 2
-//! does where nothing is set.
+//! Robots on one machine and the merge on another, each in a network namespace of its own: they find each other by
+//! multicast, as ROS 2 does where nothing is set.
 
 use crate::command::{GRIDWEAVE, run};
 use crate::ros_nodes::{script, simulate};

@@ -61,8 +61,8 @@ fn printed(mut running: Running) -> serde_json::Value {
     serde_json::from_str(&running.end_with(0)).unwrap()
 }
 
-/// The whole command merges what robots on Fast DDS publish. A viewer that comes late has the map, one on Cyclone the frames, and
-/// robots that end and come again do no harm.
+/// The whole command merges what robots on Fast DDS publish. A viewer that comes late has the map, one on Cyclone the
+/// frames, and robots that end and come again do no harm.
 #[test]
 #[ignore = "needs a Python with rclpy, named by GRIDWEAVE_ROS_PYTHON"]
 fn robots_on_fast_dds_have_one_map() {
@@ -241,7 +241,8 @@ fn hashes_of_types_are_those_of_the_packages() {
     }
 }
 
-/// Compares the hashes that packages in a folder state with those of the types that are known here, and gives the names of these.
+/// Compares the hashes that packages in a folder state with those of the types that are known here, and gives the names
+/// of these.
 #[track_caller]
 pub(crate) fn compare_hashes(share: &Path) -> BTreeSet<String> {
     let mut compared = BTreeSet::new();

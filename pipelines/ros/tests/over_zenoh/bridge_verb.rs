@@ -58,8 +58,8 @@ const PART: u64 = 20_000_000_000;
 /// How much later than the rest of its log a message is which is never sent: who plays it stays, as a robot does.
 const NEVER: u64 = 100_000_000_000_000;
 
-/// The drive of two robots in a small building, in three logs, with so few poses and readings that nobody who looks on misses
-/// one. Gives how many messages each holds.
+/// The drive of two robots in a small building, in three logs, with so few poses and readings that nobody who looks on
+/// misses one. Gives how many messages each holds.
 fn simulate(folder: &Path) -> [u64; 3] {
     let building =
         ["width=12", "height=10", "drift=0", "overlap=0.9", "tags=24", "beams=180", "duration=60", "snapshots=9"];

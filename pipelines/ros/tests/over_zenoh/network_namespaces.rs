@@ -1,5 +1,5 @@
-//! Three robots and a base, each in a network namespace of its own, with a bad link between them. The log of the base gives the
-//! same merged map as the logs of the robots.
+//! Three robots and a base, each in a network namespace of its own, with a bad link between them. The log of the base
+//! gives the same merged map as the logs of the robots.
 
 use crate::command::{GRIDWEAVE, run};
 use std::fs;

@@ -1,6 +1,6 @@
-//! The whole command between programs that others have written: robots and a viewer in Python, by `eclipse-zenoh` and `rosbags`,
-//! which have type hashes and an encoding of their own; and by `zenoh-ros2-sdk`, which has keys, tokens and attachments of its
-//! own, too.
+//! The whole command between programs that others have written: robots and a viewer in Python, by `eclipse-zenoh` and
+//! `rosbags`, which have type hashes and an encoding of their own; and by `zenoh-ros2-sdk`, which has keys, tokens and
+//! attachments of its own, too.
 
 use crate::command::{GRIDWEAVE, Running, run};
 use crate::wire::Router;
@@ -46,8 +46,8 @@ fn robots_with_scans_and_without_maps_have_one_map() {
     one_map("live_ros_scans.toml", topics, ["robots.py", "viewer.py"], &wait);
 }
 
-/// Plays two simulated robots, which publish these topics, to a pipeline, and holds what a viewer sees and what was found against
-/// the truth. The scripts are that of the robots and that of the viewer.
+/// Plays two simulated robots, which publish these topics, to a pipeline, and holds what a viewer sees and what was
+/// found against the truth. The scripts are that of the robots and that of the viewer.
 fn one_map(pipeline: &str, topics: &str, scripts: [&str; 2], more: &[&str]) {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();

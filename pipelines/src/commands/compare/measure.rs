@@ -1,7 +1,7 @@
 //! `gridweave measure`: runs one command, and measures its time and memory.
 //!
-//! The system reports the peak memory of the largest of all processes that a process has waited for; so each run is started by a
-//! separate process.
+//! The system reports the peak memory of the largest of all processes that a process has waited for; so each run is
+//! started by a separate process.
 
 use crate::interrupt::stop_on_interrupt;
 use crate::status::Status;

@@ -77,8 +77,8 @@ impl Merge<'_> {
     }
 }
 
-/// The reason of a failure from what a run has written to standard error: the first line that begins with `error`, or the
-/// last line.
+/// The reason of a failure from what a run has written to standard error: the first line that begins with `error`, or
+/// the last line.
 fn failure(messages: &Path) -> String {
     let messages = fs::read(messages).unwrap_or_default();
     let messages = String::from_utf8_lossy(&messages);

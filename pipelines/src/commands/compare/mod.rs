@@ -1,8 +1,9 @@
 //! `gridweave compare`: pipelines side by side on the same inputs.
 //!
-//! The inputs become [`cases`], logs with their truth. Every pipeline merges each of them in a separate process ([`merge_case`]),
-//! under another one that measures its time and memory ([`measure`]); so a run that crashes is a result like any other. The
-//! results are compared with the truth ([`score`]), gathered in rows ([`rows`]) and printed ([`report`]).
+//! The inputs become [`cases`], logs with their truth. Every pipeline merges each of them in a separate process
+//! ([`merge_case`]), under another one that measures its time and memory ([`measure`]); so a run that crashes is a
+//! result like any other. The results are compared with the truth ([`score`]), gathered in rows ([`rows`]) and printed
+//! ([`report`]).
 
 mod cases;
 pub(crate) mod measure;
@@ -49,8 +50,8 @@ pub(crate) struct CompareArgs {
     /// Pipeline files, or names of shipped pipelines such as `map_merge`.
     #[arg(long, required = true, num_args = 1.., value_name = "PIPELINE")]
     pipelines: Vec<PathBuf>,
-    /// Logs (MCAP files or rosbag2 folders), each with its truth beside it as NAME.truth.json; or folders: all logs in it, or all
-    /// pairs of map files that its pairs.json lists.
+    /// Logs (MCAP files or rosbag2 folders), each with its truth beside it as NAME.truth.json; or folders: all logs in
+    /// it, or all pairs of map files that its pairs.json lists.
     #[arg(long, required = true, num_args = 1.., value_name = "INPUT")]
     inputs: Vec<PathBuf>,
     /// Run each pipeline on each log with the seeds 1 to N.

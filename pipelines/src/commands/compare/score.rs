@@ -28,7 +28,8 @@ pub(super) enum Truth {
 /// The truth of a pair of map files.
 #[derive(Debug, Deserialize)]
 pub(super) struct PairTruth {
-    /// `x_b, y_b, x_a, y_a`: a place in b's and the same in a's map frame, metres. Empty if the maps have nothing in common.
+    /// `x_b, y_b, x_a, y_a`: a place in b's and the same in a's map frame, metres. Empty if the maps have nothing in
+    /// common.
     common: Vec<CommonPlace>,
     /// Median distance of the places under the best rigid transform, which the deformation of the maps causes, metres.
     #[serde(default)]

@@ -98,7 +98,8 @@ impl Comparison {
         }
     }
 
-    /// Compares the messages of one topic: those of equal log time with each other, in the order in which they were sent.
+    /// Compares the messages of one topic: those of equal log time with each other, in the order in which they were
+    /// sent.
     fn topic(&mut self, expected: &[&Recorded], got: &[&Recorded], tolerance: f64, limit: usize) {
         let whole = |message: &Recorded, expected: &str, got: &str| Difference {
             topic: Some(message.channel.topic.clone()),

@@ -86,8 +86,8 @@ impl Expect {
         Ok(Self::Field { port, name, message: message.unwrap_or_default(), path, check })
     }
 
-    /// Checks the condition; the error says what does not hold. Numbers with a fraction may differ by `tolerance` unless
-    /// `within` is given.
+    /// Checks the condition; the error says what does not hold. Numbers with a fraction may differ by `tolerance`
+    /// unless `within` is given.
     pub(super) fn check(&self, got: &Recording, tolerance: f64) -> Result<(), String> {
         match self {
             Self::Warning { text, count } => {

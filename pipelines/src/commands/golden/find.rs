@@ -50,8 +50,8 @@ pub(super) fn find(folder: &Path) -> Result<Vec<CaseFolder>> {
     }
 }
 
-/// Finds the kinds of the registry without a case, except for kinds that only take messages from outside of a live run, and kinds
-/// whose ports depend on the stage.
+/// Finds the kinds of the registry without a case, except for kinds that only take messages from outside of a live run,
+/// and kinds whose ports depend on the stage.
 pub(super) fn kinds_without_a_case(registry: &Registry, cases: &[CaseFolder]) -> Vec<String> {
     let with: BTreeSet<&str> = cases.iter().map(|case| case.kind.as_str()).collect();
     let kinds = registry.kinds().filter(|kind| !kind.is_external() && !kind.is_dynamic());

@@ -1,9 +1,9 @@
 //! `gridweave golden`: runs every stage alone on stored input, and compares its messages with stored ones.
 //!
-//! A case is a folder KIND/CASE with `stage.toml` ([`case_file`]), `input.mcap` and `expected.mcap`. Its stage runs between a
-//! source that sends the input ([`source`]) and a sink that keeps the output ([`sink`]), over the same shared-memory links as in a
-//! pipeline ([`run_case`]); the [`recording`] of its messages is compared with the expected one ([`compare`]) or replaces it
-//! (`--bless`).
+//! A case is a folder KIND/CASE with `stage.toml` ([`case_file`]), `input.mcap` and `expected.mcap`. Its stage runs
+//! between a source that sends the input ([`source`]) and a sink that keeps the output ([`sink`]), over the same
+//! shared-memory links as in a pipeline ([`run_case`]); the [`recording`] of its messages is compared with the expected
+//! one ([`compare`]) or replaces it (`--bless`).
 
 mod case_file;
 mod check_case;

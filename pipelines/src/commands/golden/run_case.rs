@@ -20,8 +20,8 @@ use std::sync::Arc;
 const SOURCE: &str = "INPUT";
 const SINK: &str = "OUTPUT";
 
-/// Placeholders in parameters for the path of `input.mcap`, of the file that the stage writes, and of the folder of the case with
-/// other files that the stage reads.
+/// Placeholders in parameters for the path of `input.mcap`, of the file that the stage writes, and of the folder of the
+/// case with other files that the stage reads.
 const INPUT: &str = "{input}";
 const OUTPUT: &str = "{output}";
 const CASE: &str = "{case}";

@@ -10,7 +10,8 @@ use std::sync::{Arc, Mutex};
 /// Received messages, by log time.
 pub(super) type Received = Arc<Mutex<Vec<Recorded>>>;
 
-/// Makes the kind of a sink that keeps all messages in `received`. Its wires are the output ports of the stage, in order.
+/// Makes the kind of a sink that keeps all messages in `received`. Its wires are the output ports of the stage, in
+/// order.
 pub(super) fn kind(name: &'static str, received: Received) -> StageKind {
     let make = move |(): (), context: &Context| {
         let inputs = context.inputs.clone();

@@ -14,8 +14,8 @@ pub(super) const MAX_STREAMS: usize = 256;
 /// Names of the ports, which must be unique.
 static PORT_NAMES: LazyLock<Vec<String>> = LazyLock::new(|| (0..MAX_STREAMS).map(|at| format!("stream{at}")).collect());
 
-/// Makes the kind of a source that sends the messages of the log at `path`. It has a port for each of the `streams`, at most
-/// [`MAX_STREAMS`], with the type of the input of `stage` that it is connected to.
+/// Makes the kind of a source that sends the messages of the log at `path`. It has a port for each of the `streams`, at
+/// most [`MAX_STREAMS`], with the type of the input of `stage` that it is connected to.
 pub(super) fn kind(name: &'static str, stage: &StageKind, path: &Path, streams: Vec<InputStream>) -> StageKind {
     let ports = streams.iter().filter_map(|stream| stage.inputs.get(stream.port)).zip(PORT_NAMES.iter());
     let ports: Vec<_> = ports.map(|(port, name)| (name.as_str(), port.port_type, port.summary)).collect();

@@ -29,8 +29,8 @@ pub(super) struct Machine<'a> {
 }
 
 impl OtherMachines {
-    /// Watches the links of a run that carry reports of other machines. A link that cannot be watched is reported and left out, so
-    /// that the stages of the run itself can still be shown.
+    /// Watches the links of a run that carry reports of other machines. A link that cannot be watched is reported and
+    /// left out, so that the stages of the run itself can still be shown.
     pub(super) fn watch(running: &Running) -> Self {
         let pipeline = &running.pipeline;
         let has_reports = |link: &super::link_choice::Link| {

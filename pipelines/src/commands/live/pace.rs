@@ -86,7 +86,8 @@ impl Pace {
 pub(super) struct Paced {
     pace: Rc<RefCell<Pace>>,
     link: Box<dyn OutputSink>,
-    /// Whether its messages begin with a header, whose stamp is shifted with them. Messages on a port of any type keep theirs.
+    /// Whether its messages begin with a header, whose stamp is shifted with them. Messages on a port of any type keep
+    /// theirs.
     has_stamp: bool,
 }
 
@@ -151,8 +152,8 @@ pub(super) fn begins_with_header(type_name: &str) -> bool {
     text.lines().map(str::trim).find(is_field).is_some_and(|field| field.starts_with("std_msgs/Header "))
 }
 
-/// Shifts the stamp of a message with a header, so that time does not go back for the stages. In CDR, the header follows the four
-/// bytes of the encapsulation and begins with the stamp (seconds, nanoseconds).
+/// Shifts the stamp of a message with a header, so that time does not go back for the stages. In CDR, the header
+/// follows the four bytes of the encapsulation and begins with the stamp (seconds, nanoseconds).
 fn make_later(bytes: &mut [u8], nanoseconds: u64) {
     let Some((seconds, nanos)) = bytes.get_mut(4..12).and_then(|stamp| stamp.split_first_chunk_mut::<4>()) else {
         return;

@@ -132,7 +132,8 @@ struct LogChannels {
 }
 
 impl LogChannels {
-    /// Writes a message. Returns `false` for the announcement of a channel, an attachment, a metadata record, or an unknown type.
+    /// Writes a message. Returns `false` for the announcement of a channel, an attachment, a metadata record, or an
+    /// unknown type.
     fn write(&mut self, message: &Message, writer: &mut LogWriter) -> Result<bool> {
         let header = message.header();
         if header.flags.contains(MessageFlags::CHANNEL) {

@@ -84,7 +84,8 @@ pub(super) fn find_run_with(
     }
 }
 
-/// Lists the runs in progress. A run whose pipeline cannot be read is left out: it has just ended, or is one of another program.
+/// Lists the runs in progress. A run whose pipeline cannot be read is left out: it has just ended, or is one of another
+/// program.
 fn all_runs(registry: &Registry) -> Result<Vec<Running>> {
     let load = |run: RunningRun| {
         let pipeline = Pipeline::load(&run.pipeline(), registry, &Overrides::default()).ok()?;

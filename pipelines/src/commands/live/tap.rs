@@ -18,8 +18,8 @@ use std::time::Duration;
 /// Arguments of `gridweave tap`.
 #[derive(Debug, Args)]
 pub(crate) struct TapArgs {
-    /// The link: STAGE.PORT, or STAGE if it has only one output; MACHINE:STAGE.PORT for a run on another machine, where MACHINE is
-    /// the name of its bridge (with `gridweave-ros`).
+    /// The link: STAGE.PORT, or STAGE if it has only one output; MACHINE:STAGE.PORT for a run on another machine, where
+    /// MACHINE is the name of its bridge (with `gridweave-ros`).
     #[arg(value_name = "[MACHINE:]STAGE.PORT")]
     pub(crate) link: String,
     #[command(flatten)]

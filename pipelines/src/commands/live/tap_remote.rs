@@ -1,7 +1,7 @@
 //! `gridweave tap MACHINE:STAGE.PORT`: prints the messages of a link of a run on another machine.
 //!
-//! The stage `bridge_tap` receives them. It connects to the same endpoint as the bridge of that machine: by default, the one on
-//! which the `bridge_source` of a run on this machine listens.
+//! The stage `bridge_tap` receives them. It connects to the same endpoint as the bridge of that machine: by default,
+//! the one on which the `bridge_source` of a run on this machine listens.
 
 use super::bridge_settings::{bridge_kind, check, connect_parameters, settings};
 use super::message_printer::{Printer, PrintingOptions, Types};
@@ -27,7 +27,8 @@ const LOOK_INTERVAL: Duration = Duration::from_millis(50);
 /// The connection to a run on another machine.
 #[derive(Debug, Args)]
 pub(crate) struct RemoteOptions {
-    /// The endpoint that the bridge of the other machine connects to, as tcp/HOST:PORT; by default that of a `bridge_source` here.
+    /// The endpoint that the bridge of the other machine connects to, as tcp/HOST:PORT; by default that of a
+    /// `bridge_source` here.
     #[arg(long, value_name = "ENDPOINT")]
     pub(crate) at: Vec<String>,
     /// Set a parameter of the connection to the other machine; `kinds bridge_tap` lists them.

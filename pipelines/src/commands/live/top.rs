@@ -214,7 +214,8 @@ const HERE: &str = "(here)";
 /// An unknown value.
 const UNKNOWN: &str = "-";
 
-/// Formats the display. On a terminal where it is redrawn each stage has one line, and columns that do not fit are left out.
+/// Formats the display. On a terminal where it is redrawn each stage has one line, and columns that do not fit are left
+/// out.
 fn to_text(running: &Running, stages: &[StageRates], others: &OtherMachines, is_redrawn: bool) -> String {
     // Without other machines, the column of machines is left out.
     let hidden = usize::from(others.machines().next().is_none());

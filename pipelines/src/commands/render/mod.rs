@@ -18,8 +18,8 @@ use std::path::PathBuf;
 /// Arguments of `gridweave render`.
 #[derive(Debug, Args)]
 pub(crate) struct RenderArgs {
-    /// Logs, each as LOG or ROBOT=LOG, or map files (map_server YAML). The maps of a log that a merge has written are drawn
-    /// aligned, other maps beside each other.
+    /// Logs, each as LOG or ROBOT=LOG, or map files (map_server YAML). The maps of a log that a merge has written are
+    /// drawn aligned, other maps beside each other.
     #[arg(required = true, value_name = "INPUT")]
     inputs: Vec<PathBuf>,
     /// The output; its ending decides the format: .png, .svg or .pdf.

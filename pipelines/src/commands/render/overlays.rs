@@ -138,8 +138,8 @@ impl OnMap<'_> {
     }
 }
 
-/// Factor by which deformations are enlarged: a round number for which the longest arrow is no longer than the spacing of the
-/// nodes.
+/// Factor by which deformations are enlarged: a round number for which the longest arrow is no longer than the spacing
+/// of the nodes.
 fn enlargement(state: &MergeState, placing: &Placing) -> f64 {
     let deformations = placing.robots.iter().filter_map(|robot| state.robots.get(&robot.name)?.deformation.as_ref());
     let max_factor = |deformation: &gridweave_runtime::ros::MapDeformation| {

@@ -80,8 +80,8 @@ fn stages_of<'a>(inputs: Option<&'a Value>, stages: &Table) -> BTreeSet<&'a str>
     }
 }
 
-/// Column of each stage: one more than those of its inputs. In a cycle, which only a delay can close, it is at most the number of
-/// stages.
+/// Column of each stage: one more than those of its inputs. In a cycle, which only a delay can close, it is at most the
+/// number of stages.
 fn columns<'a>(inputs: &BTreeMap<&'a str, BTreeSet<&'a str>>) -> BTreeMap<&'a str, usize> {
     let mut columns: BTreeMap<&str, usize> = inputs.keys().map(|name| (*name, 0)).collect();
     for _ in 0..inputs.len() {

@@ -28,8 +28,8 @@ impl LivePage {
         page::render_live(&report, &json!({}))
     }
 
-    /// Renders the contents that replace those of the page, as one line of JSON: the state of the merge after `seconds` of
-    /// log time, and the statistics of the stages in the form of the summary of a run.
+    /// Renders the contents that replace those of the page, as one line of JSON: the state of the merge after `seconds`
+    /// of log time, and the statistics of the stages in the form of the summary of a run.
     ///
     /// # Errors
     /// The contents cannot be rendered.

@@ -123,7 +123,8 @@ fn data(report: &Report) -> Result<String> {
     Ok(text.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026"))
 }
 
-/// Counts what was found in a robot's map: name, colour, and numbers of walls, tags, nodes of its deformation, and places.
+/// Counts what was found in a robot's map: name, colour, and numbers of walls, tags, nodes of its deformation, and
+/// places.
 fn finding_row(robot: &super::model::Robot) -> (String, String, [usize; 4]) {
     let counts = robot
         .findings

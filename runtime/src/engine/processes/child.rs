@@ -20,15 +20,15 @@ use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// The time that stages have to stop once the supervisor is gone. A stage that works on a message for longer is ended with its
-/// process: nobody is left who could use its result or end it.
+/// The time that stages have to stop once the supervisor is gone. A stage that works on a message for longer is ended
+/// with its process: nobody is left who could use its result or end it.
 const ORPHAN_GRACE: Duration = Duration::from_secs(5);
 
 /// The maximum time between two reports of a process.
 pub(super) const ALIVE_INTERVAL: Duration = Duration::from_millis(200);
 
-/// Runs the process called `process` of the run in `folder`, with commands of the supervisor on standard input and reports to
-/// it on standard output. `load` reads a pipeline from a file.
+/// Runs the process called `process` of the run in `folder`, with commands of the supervisor on standard input and
+/// reports to it on standard output. `load` reads a pipeline from a file.
 ///
 /// # Errors
 /// The run does not exist, or it has no such process. Failures of stages are reported to the supervisor instead.
@@ -52,8 +52,8 @@ pub fn run_process(
     process.run(supervisor).map_err(|error| format!("cannot start a thread: {error}"))
 }
 
-/// The connection to the supervisor: standard output, locked for a line at a time, as stages may print. A failure to write is
-/// ignored, as the end of the supervisor is noticed at standard input.
+/// The connection to the supervisor: standard output, locked for a line at a time, as stages may print. A failure to
+/// write is ignored, as the end of the supervisor is noticed at standard input.
 struct Supervisor<'a> {
     output: &'a mut dyn Write,
     last_report: Instant,
@@ -72,8 +72,8 @@ impl Supervisor<'_> {
     }
 }
 
-/// Raises the score of this process for the kernel's out-of-memory killer. When memory runs out, it then kills a stage, which
-/// is detected and reported, rather than the supervisor or an unrelated program. Failing to do so is harmless.
+/// Raises the score of this process for the kernel's out-of-memory killer. When memory runs out, it then kills a stage,
+/// which is detected and reported, rather than the supervisor or an unrelated program. Failing to do so is harmless.
 fn raise_oom_score() {
     let _ = std::fs::write("/proc/self/oom_score_adj", "500");
 }
@@ -157,8 +157,8 @@ impl Process<'_> {
         }
     }
 
-    /// The report for the first stage that has worked on one message for longer than `stall_timeout`, while the process was not
-    /// suspended.
+    /// The report for the first stage that has worked on one message for longer than `stall_timeout`, while the process
+    /// was not suspended.
     fn hung(&self, awake_for: Duration) -> Option<ProcessReport> {
         let longest = self.pipeline.stall_timeout.filter(|longest| awake_for > *longest)?;
         let is_hung = |stage: usize| working_for(&self.counters.stage(stage)).is_some_and(|time| time > longest);

@@ -21,8 +21,9 @@ impl Drain {
         Self { counted: 0, progressed: now }
     }
 
-    /// Checks the stages. Returns whether there was no progress for too long, during which the supervisor was not suspended
-    /// (`awake_for`). A stage that works on a message counts as progress: `stall_timeout` limits how long that may take.
+    /// Checks the stages. Returns whether there was no progress for too long, during which the supervisor was not
+    /// suspended (`awake_for`). A stage that works on a message counts as progress: `stall_timeout` limits how long
+    /// that may take.
     pub(super) fn is_stuck(&mut self, counters: &[StageCounters], awake_for: Duration, now: Instant) -> bool {
         let count = |counters: &StageCounters| {
             let has_ended = u64::from(counters.state() == StageState::Ended);

@@ -39,8 +39,8 @@ impl Process {
         let _ = self.stdin.as_mut().map(|stdin| write_line(stdin, command));
     }
 
-    /// Why it must be killed, if it must: it has sent no report for too long, during which the supervisor was not suspended
-    /// (`awake_for`), or it exceeds its memory limit.
+    /// Why it must be killed, if it must: it has sent no report for too long, during which the supervisor was not
+    /// suspended (`awake_for`), or it exceeds its memory limit.
     pub(super) fn check(&self, pipeline: &Pipeline, awake_for: Duration) -> Option<Failure> {
         if let Some(longest) =
             pipeline.stall_timeout.filter(|longest| self.last_report.elapsed().min(awake_for) > *longest)

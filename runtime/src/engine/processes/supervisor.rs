@@ -25,8 +25,8 @@ use std::time::{Duration, Instant};
 const STOP_INTERVAL: Duration = Duration::from_millis(50);
 /// The time that a process has to close its outputs before it is killed.
 const STOP_TIMEOUT: Duration = Duration::from_secs(10);
-/// The time to wait for the cause of a lost link: a process that dies breaks the links of others, whose errors may be reported
-/// before its death is noticed.
+/// The time to wait for the cause of a lost link: a process that dies breaks the links of others, whose errors may be
+/// reported before its death is noticed.
 const CAUSE_TIMEOUT: Duration = Duration::from_millis(1500);
 
 /// A failed run that is being stopped.

@@ -1,7 +1,7 @@
 //! Detection of the suspension of this process.
 //!
-//! While a process is suspended, with its container, by a debugger or by SIGSTOP, time passes in which the other processes may
-//! have been suspended too. Their silence in that time does not mean that they hang.
+//! While a process is suspended, with its container, by a debugger or by SIGSTOP, time passes in which the other
+//! processes may have been suspended too. Their silence in that time does not mean that they hang.
 
 use std::time::{Duration, Instant};
 

@@ -9,8 +9,8 @@ use super::search::{readings_by_tag, search};
 use super::step::OdometryDrift;
 use std::cmp::Ordering;
 
-/// Drifts that are assumed while the estimate grows along the drive: that of a robot with a good gyroscope, of one with encoders,
-/// and of one whose wheels slip.
+/// Drifts that are assumed while the estimate grows along the drive: that of a robot with a good gyroscope, of one with
+/// encoders, and of one whose wheels slip.
 const FIRST_DRIFTS: [OdometryDrift; 3] = [
     OdometryDrift { position: 0.01, yaw: 0.001 },
     OdometryDrift { position: 0.03, yaw: 0.01 },
@@ -54,15 +54,15 @@ pub(in super::super) fn locate(keyframes: &Keyframes, parameters: &TagLocalizerP
     }
 }
 
-/// Which of two estimates explains the readings better. The noise is that of the second, which drifts more: it cannot take drift
-/// for noise.
+/// Which of two estimates explains the readings better. The noise is that of the second, which drifts more: it cannot
+/// take drift for noise.
 fn more_probable<'a>(first: LandmarkGraph<'a>, second: LandmarkGraph<'a>) -> LandmarkGraph<'a> {
     let mut alike = first.with_noise_of(&second);
     if is_more_probable(&mut alike, &second, 0.0) { first } else { second }
 }
 
-/// Whether an estimate, after it is settled, is more probable than another one by the readings, with the same noise. `prior` is the
-/// logarithm of how much more probable it is before them.
+/// Whether an estimate, after it is settled, is more probable than another one by the readings, with the same noise.
+/// `prior` is the logarithm of how much more probable it is before them.
 fn is_more_probable(graph: &mut LandmarkGraph<'_>, than: &LandmarkGraph<'_>, prior: f64) -> bool {
     let found = graph.settle().then(|| graph.evidence()).flatten();
     found.is_some_and(|found| than.evidence().is_none_or(|other| found + prior > other))
@@ -74,8 +74,8 @@ fn is_considered(drift: &OdometryDrift) -> bool {
         && (LEAST_DRIFT.yaw..=MOST_DRIFT.yaw).contains(&drift.yaw)
 }
 
-/// Number of drifts that are compared. That poses do not drift is as probable beforehand as that they drift in any of these ways:
-/// so it is that many times as probable as each.
+/// Number of drifts that are compared. That poses do not drift is as probable beforehand as that they drift in any of
+/// these ways: so it is that many times as probable as each.
 fn number_of_drifts() -> f64 {
     let steps = |least: f64, most: f64| (most / least).ln() / DRIFT_FACTOR.ln();
     steps(LEAST_DRIFT.position, MOST_DRIFT.position) * steps(LEAST_DRIFT.yaw, MOST_DRIFT.yaw)
@@ -104,8 +104,8 @@ fn along_the_drive<'a>(
     graph.tags.iter().any(Option::is_some).then_some(graph)
 }
 
-/// Gives those tags a position that are certain by the drive so far. `searched_with` is the number of readings with which each was
-/// searched the last time.
+/// Gives those tags a position that are certain by the drive so far. `searched_with` is the number of readings with
+/// which each was searched the last time.
 fn place_tags(graph: &mut LandmarkGraph<'_>, parameters: &TagLocalizerParameters, searched_with: &mut [usize]) {
     let read = readings_by_tag(graph, parameters);
     let is_due = |tag: &usize| {

@@ -38,8 +38,8 @@ pub(super) struct LandmarkGraph<'a> {
     pub(super) noise: Vec<[Noise; Measured::KINDS]>,
 }
 
-/// Normal equations, whose unknowns are the keyframes, the tags, the calibration and the systematic errors of the odometry, in this
-/// order: then the factor has no more than a column of tags for each keyframe.
+/// Normal equations, whose unknowns are the keyframes, the tags, the calibration and the systematic errors of the
+/// odometry, in this order: then the factor has no more than a column of tags for each keyframe.
 struct LandmarkEquations {
     columns: Columns,
     right: Vec<Vector3<f64>>,

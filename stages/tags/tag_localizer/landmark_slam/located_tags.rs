@@ -14,8 +14,8 @@ use nalgebra::{DMatrix, Matrix2, Matrix3, SMatrix};
 const DISTINCT: f64 = 16.0;
 /// A difference between two estimates that is as small as this is none, metres.
 const SAME: f64 = 1.0;
-/// A random walk stays within this share of its last standard deviation with a probability of one in a hundred: poses that do are
-/// corrected by something, such as the loop closures of a SLAM.
+/// A random walk stays within this share of its last standard deviation with a probability of one in a hundred: poses
+/// that do are corrected by something, such as the loop closures of a SLAM.
 const BOUNDED: f64 = 0.5;
 
 /// Tags that were located together with the drive.
@@ -27,8 +27,8 @@ pub(in super::super) struct LocatedTags {
     pub(in super::super) poses: Vec<(LogTime, Pose2)>,
 }
 
-/// The tags by an estimate, with the covariance that another one of the same tags gives them. A tag that a search at the estimated
-/// poses finds elsewhere is not located.
+/// The tags by an estimate, with the covariance that another one of the same tags gives them. A tag that a search at
+/// the estimated poses finds elsewhere is not located.
 pub(super) fn located(
     drive: &Keyframes,
     parameters: &TagLocalizerParameters,
@@ -66,8 +66,8 @@ pub(super) fn located(
     Some(LocatedTags { modes: ids.collect(), poses })
 }
 
-/// The frame of the estimate in that of the poses: that of the first pose where these drift away from it. Where they drift and do not
-/// get away, it is the one in which they are right on the whole.
+/// The frame of the estimate in that of the poses: that of the first pose where these drift away from it. Where they
+/// drift and do not get away, it is the one in which they are right on the whole.
 fn frame(drive: &Keyframes, graph: &LandmarkGraph<'_>) -> Pose2 {
     let corrections = drive
         .keyframes
@@ -86,8 +86,9 @@ fn frame(drive: &Keyframes, graph: &LandmarkGraph<'_>) -> Pose2 {
     fit_rigid(&pairs.collect::<Vec<_>>()).map_or_else(Pose2::identity, |fit| fit.transform_a_b)
 }
 
-/// The factor by which the covariances of tags are to be widened, so that a frame that is fitted to them as if they were
-/// independent is no more certain than it is: the errors of tags have the drift of the robot before it saw them in common.
+/// The factor by which the covariances of tags are to be widened, so that a frame that is fitted to them as if they
+/// were independent is no more certain than it is: the errors of tags have the drift of the robot before it saw them in
+/// common.
 fn common_error(places: &[Point2], covariance: &DMatrix<f64>) -> f64 {
     let centre = places.iter().fold(Point2::origin(), |sum, place| sum + place.coords / places.len().max(1) as f64);
     // The fit of a frame: x, y, yaw about the centre, by weights of the tags alone.

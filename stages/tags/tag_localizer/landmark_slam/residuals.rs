@@ -45,8 +45,8 @@ impl ReadingFactor {
         self.iter().map(|row| row.residual * row.residual).sum()
     }
 
-    /// The rows of a reading whose noise is `factor` times as large as claimed. `pose_stddev` is the error of a pose of its own,
-    /// metres.
+    /// The rows of a reading whose noise is `factor` times as large as claimed. `pose_stddev` is the error of a pose of
+    /// its own, metres.
     pub(super) fn new(
         reading: &KeyframeReading,
         keyframe: &Pose2,

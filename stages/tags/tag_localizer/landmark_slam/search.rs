@@ -18,8 +18,8 @@ pub(super) fn search(tags: &[FarTag], parameters: &TagLocalizerParameters) -> Ve
     far_tags::locate(tags, &coarse)
 }
 
-/// The readings of each tag at the estimated poses, not more than a search needs, and the number of all. Ranges are corrected by
-/// the calibration so far.
+/// The readings of each tag at the estimated poses, not more than a search needs, and the number of all. Ranges are
+/// corrected by the calibration so far.
 pub(super) fn readings_by_tag(graph: &LandmarkGraph<'_>, parameters: &TagLocalizerParameters) -> Vec<(FarTag, usize)> {
     let mut tags = vec![(FarTag::default(), 0); graph.tags.len()];
     for reading in graph.readings() {

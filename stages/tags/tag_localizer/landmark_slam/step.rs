@@ -23,7 +23,8 @@ impl OdometryDrift {
     /// No drift.
     pub(super) const NONE: Self = Self { position: 0.0, yaw: 0.0 };
 
-    /// Information on the systematic errors of a drive: what odometry drifts by in one metre by chance, it may drift by in each.
+    /// Information on the systematic errors of a drive: what odometry drifts by in one metre by chance, it may drift by
+    /// in each.
     pub(super) fn systematic_information(&self) -> Vector3<f64> {
         let [least, least_yaw] = LEAST_SYSTEMATIC;
         let (position, yaw) = (self.position.max(least).powi(-2), self.yaw.max(least_yaw).powi(-2));
@@ -92,8 +93,8 @@ impl OdometryStep {
         }
     }
 
-    /// Covariance (x, y, yaw) of the step, in the frame of the keyframe before: an error of the yaw on the way turns what
-    /// follows.
+    /// Covariance (x, y, yaw) of the step, in the frame of the keyframe before: an error of the yaw on the way turns
+    /// what follows.
     pub(super) fn covariance(&self, drift: &OdometryDrift) -> Matrix3<f64> {
         let end = self.transform.translation.vector;
         let arms = self.second_moment - self.first_moment * end.transpose() - end * self.first_moment.transpose()

@@ -25,8 +25,8 @@ const TAGS: [Point2; 6] = [
     Point2::new(6.0, 2.0),
 ];
 
-/// Three rounds of a square of 8 m from the origin on, whose odometry turns by `drift` radians after a metre. One reading of twenty is
-/// of another tag.
+/// Three rounds of a square of 8 m from the origin on, whose odometry turns by `drift` radians after a metre. One
+/// reading of twenty is of another tag.
 fn drive(reads: Reads, drift: f64, seed: u64) -> (Keyframes, Vec<Pose2>) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let noise = Normal::new(0.0, 1.0).unwrap();

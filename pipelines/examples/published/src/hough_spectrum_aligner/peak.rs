@@ -1,7 +1,7 @@
 //! The place and the width of a peak in a row of values.
 
-/// How far the top of a peak may lie from where the truth is, as a share of its half width: fitted to the errors in simulated
-/// maps.
+/// How far the top of a peak may lie from where the truth is, as a share of its half width: fitted to the errors in
+/// simulated maps.
 const DEVIATION_OF_HALF_WIDTH: f64 = 0.1;
 
 /// A peak in a row of values, in steps of the row.
@@ -16,8 +16,8 @@ pub(super) struct Peak {
 }
 
 impl Peak {
-    /// The peak whose highest value has an index. `value` gives the values for all whole numbers, `within` of which on either
-    /// side are looked at.
+    /// The peak whose highest value has an index. `value` gives the values for all whole numbers, `within` of which on
+    /// either side are looked at.
     ///
     /// Its half width is where the values have fallen halfway to the mean of all.
     pub(super) fn at(index: i64, within: i64, mean: f64, value: impl Fn(i64) -> f64) -> Self {
@@ -34,8 +34,8 @@ impl Peak {
     }
 }
 
-/// The highest local maxima of values, the highest first, at least `apart` steps from each other. In a circle if `period` is
-/// their number.
+/// The highest local maxima of values, the highest first, at least `apart` steps from each other. In a circle if
+/// `period` is their number.
 pub(super) fn highest(values: &[f64], most: usize, apart: f64, period: Option<f64>) -> Vec<usize> {
     let count = values.len();
     let neighbour = |index: usize, side: isize| {

@@ -13,8 +13,8 @@ pub struct Rotation {
     pub deviation: f64,
 }
 
-/// The circular cross-correlation of two Hough spectra: `CC(k)` = sum over i of `HS_a(i) HS_b(i - k)`. It is high where map b,
-/// turned by `k * pi / count`, has walls that run as those of map a.
+/// The circular cross-correlation of two Hough spectra: `CC(k)` = sum over i of `HS_a(i) HS_b(i - k)`. It is high where
+/// map b, turned by `k * pi / count`, has walls that run as those of map a.
 pub fn correlate_spectra(a: &HoughSpectrum, b: &HoughSpectrum) -> Vec<f64> {
     let (a, b) = (&a.values, &b.values);
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -26,8 +26,8 @@ pub fn correlate_spectra(a: &HoughSpectrum, b: &HoughSpectrum) -> Vec<f64> {
         .collect()
 }
 
-/// The highest peaks of the cross-correlation of two spectra of equal length, the highest first, at least `apart` radians from
-/// each other.
+/// The highest peaks of the cross-correlation of two spectra of equal length, the highest first, at least `apart`
+/// radians from each other.
 pub fn rotations(a: &HoughSpectrum, b: &HoughSpectrum, most: usize, apart: f64) -> Vec<Rotation> {
     let correlation = correlate_spectra(a, b);
     let count = correlation.len();

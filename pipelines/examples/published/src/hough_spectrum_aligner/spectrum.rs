@@ -5,12 +5,15 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// How much the walls of a map run along each direction: `HS(theta)` = sum over rho of `HT(rho, theta)^2`, where
-/// `HT(rho, theta)` is the number of occupied cells on the line `x cos(theta) + y sin(theta) = rho` (the Hough transform).
+/// `HT(rho, theta)` is the number of occupied cells on the line `x cos(theta) + y sin(theta) = rho` (the Hough
+/// transform).
 ///
-/// It does not depend on where the map's origin lies, and turning the map by psi shifts it by psi. Its period is half a turn.
+/// It does not depend on where the map's origin lies, and turning the map by psi shifts it by psi. Its period is half a
+/// turn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HoughSpectrum {
-    /// `HS(theta)` for `theta = k * pi / values.len()`: theta is the direction of the normal of a wall, map frame, radians.
+    /// `HS(theta)` for `theta = k * pi / values.len()`: theta is the direction of the normal of a wall, map frame,
+    /// radians.
     pub values: Vec<f64>,
 }
 

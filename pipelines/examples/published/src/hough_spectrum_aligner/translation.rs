@@ -4,8 +4,8 @@ use super::WallCells;
 use super::peak::{Peak, highest};
 use nalgebra::{UnitComplex, Vector2};
 
-/// A map's projection on an axis: how many occupied cells there are at each place along it. Carpin calls those on x and y the
-/// X spectrum and the Y spectrum.
+/// A map's projection on an axis: how many occupied cells there are at each place along it. Carpin calls those on x and
+/// y the X spectrum and the Y spectrum.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Projection {
     /// The lower end of the first count, metres.
@@ -40,8 +40,8 @@ pub fn project(walls: &WallCells, angle: f64, cell: f64) -> [Projection; 2] {
     counts.map(|counts| Projection { start: -half * cell, counts })
 }
 
-/// The translations of b along an axis at which the cross-correlation of both projections is highest, the best first, at least
-/// `apart` metres from each other.
+/// The translations of b along an axis at which the cross-correlation of both projections is highest, the best first,
+/// at least `apart` metres from each other.
 pub fn shifts(a: &Projection, b: &Projection, cell: f64, most: usize, apart: f64) -> Vec<Shift> {
     let (length_a, length_b) = (a.counts.len() as i64, b.counts.len() as i64);
     let correlation: Vec<f64> = (1 - length_b..length_a)

@@ -6,8 +6,8 @@
 //! equal distance from two obstacles, so its probability is that of these cells, and edges in well-known areas count
 //! more when maps are matched.
 //!
-//! The skeleton itself is that of [`skeleton`](gridweave_stages::topology::skeleton). What the paper leaves open, and how it is
-//! decided here:
+//! The skeleton itself is that of [`skeleton`](gridweave_stages::topology::skeleton). What the paper leaves open, and
+//! how it is decided here:
 //! - **The cells that define a point** are its own cell, and two of the cells that are not free at about the least
 //!   distance: the nearest one, and the one on the other side, that is, in the direction farthest from that to the
 //!   first.

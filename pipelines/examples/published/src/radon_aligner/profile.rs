@@ -59,8 +59,8 @@ impl Profile {
         Self { start, bin, values: above_surroundings(&counts, reach) }
     }
 
-    /// The shifts of profile b, in bins of the same length, at which it fits best: the best first, at most `count`, each away
-    /// from the others.
+    /// The shifts of profile b, in bins of the same length, at which it fits best: the best first, at most `count`,
+    /// each away from the others.
     pub fn shifts(&self, b: &Self, count: usize) -> Vec<Shift> {
         if self.values.is_empty() || b.values.is_empty() {
             return Vec::new();

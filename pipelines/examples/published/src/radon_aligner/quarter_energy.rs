@@ -20,8 +20,8 @@ pub struct RotationPeak {
     pub rotation: f64,
     /// The correlation of both energies at that rotation, up to 1.
     pub correlation: f64,
-    /// The standard deviation of the rotation, radians: a tenth of that of the Gaussian which is as wide as the correlation's
-    /// peak at half its height.
+    /// The standard deviation of the rotation, radians: a tenth of that of the Gaussian which is as wide as the
+    /// correlation's peak at half its height.
     pub deviation: f64,
 }
 

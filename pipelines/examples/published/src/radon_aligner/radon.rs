@@ -8,7 +8,8 @@ use std::f64::consts::FRAC_PI_2;
 /// Bins for each cell along a projection. They are smoothed to a tent a cell wide on both sides.
 const BINS_PER_CELL: f32 = 2.0;
 
-/// The steps of a sequence of places that fill a square evenly (Roberts 2018: powers of the inverse of the plastic number).
+/// The steps of a sequence of places that fill a square evenly (Roberts 2018: powers of the inverse of the plastic
+/// number).
 const SPREAD: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
 
 /// As many points are projected before they are counted.
@@ -16,8 +17,8 @@ const BLOCK: usize = 256;
 
 /// A point in each occupied cell of a grid, in cells along its axes, from the middle of the rectangle round them.
 ///
-/// A cell is a square, and not the point in its middle: the points lie anywhere in their cells, evenly spread. If all lay in the
-/// middle, their lattice would show as directions of walls, along the grid and across its diagonals.
+/// A cell is a square, and not the point in its middle: the points lie anywhere in their cells, evenly spread. If all
+/// lay in the middle, their lattice would show as directions of walls, along the grid and across its diagonals.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WallPoints {
     x: Vec<f32>,
@@ -60,9 +61,9 @@ impl WallPoints {
     }
 }
 
-/// The energy of the Radon transform at `steps` angles over a quarter turn, of each of which that across it is part: the sum
-/// over both projections of the square of what lies in a bin. The angle is that of the normal of a wall, and at once the
-/// direction of the walls across it; in units of no meaning.
+/// The energy of the Radon transform at `steps` angles over a quarter turn, of each of which that across it is part:
+/// the sum over both projections of the square of what lies in a bin. The angle is that of the normal of a wall, and at
+/// once the direction of the walls across it; in units of no meaning.
 pub fn energy(points: &WallPoints, steps: usize) -> Vec<f64> {
     if points.is_empty() {
         return vec![0.0; steps];

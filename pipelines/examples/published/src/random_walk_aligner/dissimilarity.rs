@@ -67,8 +67,9 @@ impl ClassifiedMap {
     }
 }
 
-/// `psi` = sum over the classes c of `d(a, b, c) + d(b, a, c)`, metres, where `d(a, b, c)` is the mean Manhattan distance from
-/// a cell of class c in map a to the nearest one of that class in map b: Carpin, Birk and Jucikas 2005, and Birk and Carpin 2006.
+/// `psi` = sum over the classes c of `d(a, b, c) + d(b, a, c)`, metres, where `d(a, b, c)` is the mean Manhattan
+/// distance from a cell of class c in map a to the nearest one of that class in map b: Carpin, Birk and Jucikas 2005,
+/// and Birk and Carpin 2006.
 ///
 /// Distances are along the axes of the map in which they are looked up. A class without a cell in a map is ignored.
 pub fn dissimilarity(a: &ClassifiedMap, b: &ClassifiedMap, transform_a_b: &Pose2) -> f64 {

@@ -3,8 +3,8 @@
 use gridweave_stages::registration::search::{Content, Raster};
 use nalgebra::Vector2;
 
-/// The Manhattan distance, in cells, from every cell of a raster to the nearest one of a class: Carpin, Birk and Jucikas 2005,
-/// who find it in two sweeps over the map.
+/// The Manhattan distance, in cells, from every cell of a raster to the nearest one of a class: Carpin, Birk and
+/// Jucikas 2005, who find it in two sweeps over the map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DistanceMap {
     width: usize,
@@ -37,8 +37,8 @@ impl DistanceMap {
         Some(Self { width, height, distances })
     }
 
-    /// The distance from a place in cells: that of the cell it lies in or, outside, that of the nearest cell and the way to it.
-    /// NaN for one that is no place.
+    /// The distance from a place in cells: that of the cell it lies in or, outside, that of the nearest cell and the
+    /// way to it. NaN for one that is no place.
     pub fn at(&self, place: &Vector2<f64>) -> f64 {
         let inside = |place: f64, count: usize| place.clamp(0.0, count as f64 - 1.0);
         let (x, y) = (inside(place.x.floor(), self.width), inside(place.y.floor(), self.height));

@@ -52,7 +52,8 @@ pub fn kind() -> StageKind {
     .build()
 }
 
-/// The method, with the seed of the stage: every pair is walked with the same, so that it does not matter which others there are.
+/// The method, with the seed of the stage: every pair is walked with the same, so that it does not matter which others
+/// there are.
 struct RandomWalk {
     parameters: RandomWalkParameters,
     seed: u64,

@@ -15,7 +15,8 @@ pub struct RandomWalkParameters {
     /// Largest number of cells of each class and map in the dissimilarity psi, evenly sampled.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub max_points: usize,
-    /// Number of walks for each pair of maps, which begin at evenly spaced rotations, with the centres of the maps aligned.
+    /// Number of walks for each pair of maps, which begin at evenly spaced rotations, with the centres of the maps
+    /// aligned.
     #[schemars(range(min = 1, max = 10_000))]
     pub walks: usize,
     /// Largest number of trials of a walk.
@@ -30,27 +31,27 @@ pub struct RandomWalkParameters {
     /// The standard deviation of the first turns, radians.
     #[schemars(range(min = 1e-3, max = PI))]
     pub first_turn: f64,
-    /// Number of accepted moves whose mean and deviations are those of further moves; after as many refusals in a row the
-    /// deviations are halved.
+    /// Number of accepted moves whose mean and deviations are those of further moves; after as many refusals in a row
+    /// the deviations are halved.
     #[schemars(range(min = 1, max = 10_000))]
     pub history: usize,
     /// The probability that a move is accepted which makes psi worse, so that a walk can leave a local minimum.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub accept_worse: f64,
-    /// Two poses are the same if the centre of the map is moved by less than this, metres, and it is turned by less than
-    /// `apart_yaw`.
+    /// Two poses are the same if the centre of the map is moved by less than this, metres, and it is turned by less
+    /// than `apart_yaw`.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub apart: f64,
     /// See `apart`, radians.
     #[schemars(range(min = 0.0, max = PI))]
     pub apart_yaw: f64,
-    /// Least acceptance index omega of an accepted pose. In maps that were built from laser scans in six buildings, right
-    /// poses had 0.97 and more, and those of different buildings up to 0.951; other maps, of mostly free space, have more at
-    /// wrong poses.
+    /// Least acceptance index omega of an accepted pose. In maps that were built from laser scans in six buildings,
+    /// right poses had 0.97 and more, and those of different buildings up to 0.951; other maps, of mostly free space,
+    /// have more at wrong poses.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_omega: f64,
-    /// Least share of the smaller map at which the other must be known. The papers require none, and maps that share a few
-    /// cells nearly always agree on them.
+    /// Least share of the smaller map at which the other must be known. The papers require none, and maps that share a
+    /// few cells nearly always agree on them.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_overlap: f64,
     /// Largest number of hypotheses that are sent for a pair of maps.

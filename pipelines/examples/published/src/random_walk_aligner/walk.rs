@@ -22,10 +22,10 @@ pub struct WalkEnd {
 /// Walks from a place to one where `value` is small.
 ///
 /// A trial is a move drawn from a normal distribution. It is accepted if it makes the value less and, with probability
-/// `accept_worse`, if it does not. The mean and the deviations of the distribution are those of the last accepted moves (the
-/// adaptive random walk of Carpin and Birk), at least `least` along each axis and at most the `first`. The papers leave open
-/// what follows when no move is accepted any more: here the deviations are halved after as many refusals in a row as the history
-/// is long.
+/// `accept_worse`, if it does not. The mean and the deviations of the distribution are those of the last accepted moves
+/// (the adaptive random walk of Carpin and Birk), at least `least` along each axis and at most the `first`. The papers
+/// leave open what follows when no move is accepted any more: here the deviations are halved after as many refusals in
+/// a row as the history is long.
 pub fn walk(
     start: Vector3<f64>,
     first: &Vector3<f64>,

@@ -8,14 +8,15 @@ use rayon::prelude::*;
 
 /// Cells along the side of a tile, which has one covariance.
 pub const TILE: usize = 8;
-/// Least standard deviation, in cells, at which the kernel is applied to cells twice as wide: it is as smooth there as a
-/// kernel of half as many is on the cells themselves.
+/// Least standard deviation, in cells, at which the kernel is applied to cells twice as wide: it is as smooth there as
+/// a kernel of half as many is on the cells themselves.
 const WIDE: f64 = 4.0;
 
-/// Convolves a map in log-odds, on cells of `geometry` in the world, with the kernel of each tile (algorithm 1, step 6).
+/// Convolves a map in log-odds, on cells of `geometry` in the world, with the kernel of each tile (algorithm 1, step
+/// 6).
 ///
-/// `log_odds` and `blurred` have the cells of `geometry`, row by row. Where nothing is said within the reach of a kernel,
-/// the result is 0.
+/// `log_odds` and `blurred` have the cells of `geometry`, row by row. Where nothing is said within the reach of a
+/// kernel, the result is 0.
 pub fn convolve(log_odds: &[f32], geometry: &GridGeometry, covariance: &PointCovariance, blurred: &mut [f32]) {
     let (width, height) = (geometry.width, geometry.height);
     if width == 0 || height == 0 {
@@ -65,7 +66,8 @@ impl Tile<'_> {
         }
     }
 
-    /// The same on a field of cells twice as wide. Cells that lie at the same place in a wide one have a kernel in common.
+    /// The same on a field of cells twice as wide. Cells that lie at the same place in a wide one have a kernel in
+    /// common.
     fn convolve_on_coarse_cells(self, field: &PaddedField, kernel: &mut Kernel, covariance: &Matrix2<f64>) {
         const HALF: usize = TILE / 2;
         // A mean of two cells adds the variance of where they lie to the blur.
@@ -134,8 +136,8 @@ fn in_cells(covariance: &Matrix2<f64>, geometry: &GridGeometry) -> Matrix2<f64> 
     turn.transpose() * covariance * turn / geometry.resolution.powi(2)
 }
 
-/// The same as the paper prints it: every cell with a kernel of its own that is as large as the map, and not cut. It takes
-/// time by the square of the number of cells.
+/// The same as the paper prints it: every cell with a kernel of its own that is as large as the map, and not cut. It
+/// takes time by the square of the number of cells.
 pub fn convolve_exactly(log_odds: &[f32], geometry: &GridGeometry, covariance: &PointCovariance) -> Vec<f32> {
     let (width, height) = (geometry.width as isize, geometry.height as isize);
     let of_cell = |index: usize| {

@@ -31,8 +31,8 @@ impl Kernel {
         (CUT * deviation).floor().clamp(0.0, 1e6) as usize
     }
 
-    /// Makes this the kernel of a covariance, in square cells, which is positive definite, round a place that lies `off` from the
-    /// middle of its cell, in cells.
+    /// Makes this the kernel of a covariance, in square cells, which is positive definite, round a place that lies
+    /// `off` from the middle of its cell, in cells.
     pub fn set(&mut self, covariance: &Matrix2<f64>, off: &Vector2<f64>) {
         self.rows.clear();
         self.weights.clear();
@@ -64,7 +64,8 @@ impl Kernel {
         self.weights.iter_mut().for_each(|weight| *weight /= sum);
     }
 
-    /// The rows, from the lowest: how far above the middle it lies, how far right of it the first cell, and the weights.
+    /// The rows, from the lowest: how far above the middle it lies, how far right of it the first cell, and the
+    /// weights.
     pub fn rows(&self) -> impl Iterator<Item = (isize, isize, &[f32])> {
         self.rows.iter().map(|row| (row.row, row.column, &self.weights[row.start..row.end]))
     }

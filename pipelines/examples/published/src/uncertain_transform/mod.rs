@@ -9,19 +9,21 @@
 //! connected and grows away from there.
 //!
 //! What the paper leaves open, and how it is decided here:
-//! - **The transformed map** is looked up cell by cell as in `grid_fuser`, since carrying cells forward and rounding leaves
-//!   gaps (step 1 of the algorithm).
+//! - **The transformed map** is looked up cell by cell as in `grid_fuser`, since carrying cells forward and rounding
+//!   leaves gaps (step 1 of the algorithm).
 //! - **The kernel's size**: the paper takes one as large as the map. It is cut at three standard deviations, on the
 //!   ellipse, and normalised to 1 over what is left: a cell keeps 98.9 % of its blur and costs some hundred
 //!   multiplications instead of a million. [`convolve_exactly`] is the form without the cut, for tests.
-//! - **Kernels per tile**: all cells of a tile of [`TILE`] x [`TILE`] take the kernel of its middle. S_n changes from one
-//!   edge of a tile to the other by the turn of as many cells, which is far below the width of a kernel.
-//! - **Wide kernels on coarse cells**: where a place is uncertain by four cells and more in every direction, the kernel is laid
-//!   on means of 2 x 2 cells, and narrowed by what these means blur. Nothing so blurred has any detail of the size of a cell.
-//! - **A cell's own width**: the variance of a place in a square cell is added to S_n. It makes every S_n invertible, that of
-//!   the reference robot among them, whose map is not blurred by it.
-//! - **Unknown cells** have log-odds of 0, as in the paper. A wall may so reach into what its robot has not seen, as far as the
-//!   wall may lie there. Such a cell stays unknown where less than half a percent is left of what it would say.
+//! - **Kernels per tile**: all cells of a tile of [`TILE`] x [`TILE`] take the kernel of its middle. S_n changes from
+//!   one edge of a tile to the other by the turn of as many cells, which is far below the width of a kernel.
+//! - **Wide kernels on coarse cells**: where a place is uncertain by four cells and more in every direction, the kernel
+//!   is laid on means of 2 x 2 cells, and narrowed by what these means blur. Nothing so blurred has any detail of the
+//!   size of a cell.
+//! - **A cell's own width**: the variance of a place in a square cell is added to S_n. It makes every S_n invertible,
+//!   that of the reference robot among them, whose map is not blurred by it.
+//! - **Unknown cells** have log-odds of 0, as in the paper. A wall may so reach into what its robot has not seen, as
+//!   far as the wall may lie there. Such a cell stays unknown where less than half a percent is left of what it would
+//!   say.
 //! - **Bounds**: a point less certain than `max_deviation` is blurred with that deviation, since the cost grows with
 //!   the square of the blur, and its evidence is negligible in any case.
 //!

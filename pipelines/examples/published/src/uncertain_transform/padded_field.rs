@@ -12,7 +12,8 @@ pub(super) struct PaddedField {
 }
 
 impl PaddedField {
-    /// The cells of a map, row by row, with as many empty ones round them as a kernel of that standard deviation reaches, in cells.
+    /// The cells of a map, row by row, with as many empty ones round them as a kernel of that standard deviation
+    /// reaches, in cells.
     pub(super) fn new(log_odds: &[f32], geometry: &GridGeometry, deviation: f64) -> Self {
         let mut field = Self::empty(geometry.width, geometry.height, deviation);
         for (row, values) in log_odds.chunks_exact(geometry.width).enumerate() {

@@ -11,7 +11,8 @@ pub struct UncertainTransformParameters {
     /// Metres a cell in the world. If it is not given: that of the reference robot's map.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub resolution: Option<f64>,
-    /// Metres. A place whose standard deviation is greater is blurred as if it had this one. The time goes with its square.
+    /// Metres. A place whose standard deviation is greater is blurred as if it had this one. The time goes with its
+    /// square.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub max_deviation: f64,
     /// Probability that a cell of value 100 is occupied; greater ones are clamped to it.

@@ -1,7 +1,7 @@
 //! Server of the page and of its changes for browsers.
 //!
-//! Changes are server-sent events. Each browser has a thread, which sends it the last change, and the next one once it has taken
-//! that. So a slow browser gets fewer changes, and does not delay the others.
+//! Changes are server-sent events. Each browser has a thread, which sends it the last change, and the next one once it
+//! has taken that. So a slow browser gets fewer changes, and does not delay the others.
 
 use anyhow::{Result, anyhow};
 use gridweave_logs::browsers::{BrowserServer, Connection};
