@@ -3,7 +3,6 @@
 use super::MapCleanerParameters;
 use super::objects::each_loose_segment;
 use super::passages::wide_known_space;
-use super::sheet_frame::frame_of_sheet;
 use crate::shared::geometry::{CellBox, Grid, UNKNOWN, is_known, is_occupied};
 
 /// Sets everything that is no wall to unknown in `cells`, a copy of the cells of `grid`: unknown cells are no
@@ -11,10 +10,7 @@ use crate::shared::geometry::{CellBox, Grid, UNKNOWN, is_known, is_occupied};
 ///
 /// - Occupied cells that belong to no wall: people, legs of chairs, dust, and the ends of beams without a hit.
 /// - Known space that is narrower than a robot, such as rays through glass and open doors. Walls stay.
-/// - The frame of a drawn sheet, with the title block.
-///
-/// Returns whether there is such a frame.
-pub fn clean(grid: &Grid<'_>, parameters: &MapCleanerParameters, cells: &mut [i8]) -> bool {
+pub fn clean(grid: &Grid<'_>, parameters: &MapCleanerParameters, cells: &mut [i8]) {
     let radius = (0.5 * parameters.min_passage / grid.geometry.resolution).min(1e6) as usize;
     if let (true, Some(known_box)) = (radius > 0, CellBox::holding(grid, is_known)) {
         let wide = wide_known_space(grid, &known_box, radius);
@@ -36,7 +32,4 @@ pub fn clean(grid: &Grid<'_>, parameters: &MapCleanerParameters, cells: &mut [i8
             }
         }
     });
-    let frame = frame_of_sheet(grid);
-    frame.iter().flatten().for_each(|place| cells[*place] = UNKNOWN);
-    frame.is_some()
 }

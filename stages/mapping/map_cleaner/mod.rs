@@ -4,8 +4,9 @@
 //! Walls are the same for every robot and on every day. People, legs of furniture, dust and reflections in glass are
 //! not: they are evidence against right poses, and for wrong ones.
 //!
-//! - [`clean`]: objects that are too small for walls, known space that is too narrow, and the frame of a drawn sheet
-//!   become unknown.
+//! - [`clean`]: objects that are too small for walls, and known space that is too narrow, become unknown.
+//! - [`frame_of_sheet`]: the frame of a drawn sheet. Of several sheets with a frame of one size, only the first keeps it:
+//!   so it is evidence for nothing.
 
 mod clean;
 mod objects;
@@ -19,6 +20,7 @@ mod tests;
 
 pub use clean::clean;
 pub use parameters::MapCleanerParameters;
+pub use sheet_frame::{SheetFrame, frame_of_sheet};
 
 use gridweave_runtime::stage::StageKind;
 use stage::MapCleaner;
@@ -29,8 +31,8 @@ pub fn kind() -> StageKind {
         "map_cleaner",
         "Clears maps of what is no wall, for the stages that compare them: single cells and small objects, as people, legs \
          and dust leave them, and known space that is narrower than a robot, as rays through glass and open doors leave it; \
-         and the frame of a drawn sheet with its title block. They become unknown, which says nothing for or against a place.",
-        |parameters: MapCleanerParameters, _| Ok(MapCleaner { parameters }),
+         and the frame of a drawn sheet, with its title block, if an earlier map has one of that size. They become unknown, which says nothing for or against a place.",
+        |parameters: MapCleanerParameters, _| Ok(MapCleaner::new(parameters)),
     )
     .input("map", "The robots' maps.", MapCleaner::receive_map)
     .build()

@@ -1,4 +1,4 @@
-//! The frame of a drawn sheet, with the title block at it.
+//! The frame of a drawn sheet, with the title block in it.
 
 use crate::shared::geometry::{CellBox, Grid, is_known, is_occupied};
 
@@ -13,10 +13,29 @@ const LEAST_FILLED: f64 = 0.98;
 /// of the building.
 const LEAST_REST: f64 = 0.1;
 
-/// The cells of the rectangle along the edges of a drawing, and of all that is connected with it. Sheets of one set
-/// have the same frame and the same title block, whatever they show. None for the map of a robot, or where the
-/// rectangle is the outer wall of all that is drawn.
-pub(super) fn frame_of_sheet(grid: &Grid<'_>) -> Option<Vec<usize>> {
+/// Largest difference of the sizes of two frames that are the same, as a share of it.
+const SAME_SIZE: f64 = 0.02;
+
+/// The rectangle along the edges of a drawing, and all that is connected with it, such as a title block.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SheetFrame {
+    /// Numbers of its cells.
+    pub cells: Vec<usize>,
+    /// Width and height, metres.
+    pub size: [f64; 2],
+}
+
+impl SheetFrame {
+    /// Whether it has the size of another one.
+    pub fn is_as_large(&self, other: &[f64; 2]) -> bool {
+        self.size.iter().zip(other).all(|(one, other)| (one - other).abs() <= SAME_SIZE * other)
+    }
+}
+
+/// The frame of a drawn sheet. Sheets of one set have the same frame and the same title block, whatever they show. None
+/// for a map of which much is unknown, as in those of robots, or where the rectangle is the wall of nearly all that is
+/// drawn.
+pub fn frame_of_sheet(grid: &Grid<'_>) -> Option<SheetFrame> {
     let (width, height) = (grid.geometry.width, grid.geometry.height);
     let most_unknown = (MOST_UNKNOWN * grid.cells.len() as f64) as usize;
     if grid.cells.iter().filter(|value| !is_known(**value)).nth(most_unknown).is_some() {
@@ -44,9 +63,11 @@ pub(super) fn frame_of_sheet(grid: &Grid<'_>) -> Option<Vec<usize>> {
     }
     let middle = (columns.start + columns.end) / 2;
     let start = (rows.start..rows.start + SIDE).find(|row| is_wall(middle, *row))? * width + middle;
-    let frame = connected(grid, start);
+    let cells = connected(grid, start);
     let occupied = grid.cells.iter().filter(|value| is_occupied(**value)).count();
-    ((occupied - frame.len()) as f64 >= LEAST_REST * occupied as f64).then_some(frame)
+    let is_apart = (occupied - cells.len()) as f64 >= LEAST_REST * occupied as f64;
+    let size = [columns.len(), rows.len()].map(|cells| cells as f64 * grid.geometry.resolution);
+    is_apart.then_some(SheetFrame { cells, size })
 }
 
 /// The occupied cells that are connected with one, by sides or corners.
