@@ -5,14 +5,11 @@
 //! not: they are evidence against right poses, and for wrong ones.
 //!
 //! - [`clean`]: objects that are too small for walls, and known space that is too narrow, become unknown.
-//! - [`frame_of_sheet`]: the frame of a drawn sheet. Of several sheets with a frame of one size, only the first keeps it:
-//!   so it is evidence for nothing.
 
 mod clean;
 mod objects;
 mod parameters;
 mod passages;
-mod sheet_frame;
 mod stage;
 
 #[cfg(test)]
@@ -20,7 +17,6 @@ mod tests;
 
 pub use clean::clean;
 pub use parameters::MapCleanerParameters;
-pub use sheet_frame::{SheetFrame, frame_of_sheet};
 
 use gridweave_runtime::stage::StageKind;
 use stage::MapCleaner;
@@ -30,9 +26,9 @@ pub fn kind() -> StageKind {
     StageKind::stage(
         "map_cleaner",
         "Clears maps of what is no wall, for the stages that compare them: single cells and small objects, as people, legs \
-         and dust leave them, and known space that is narrower than a robot, as rays through glass and open doors leave it; \
-         and the frame of a drawn sheet, with its title block, if an earlier map has one of that size. They become unknown, which says nothing for or against a place.",
-        |parameters: MapCleanerParameters, _| Ok(MapCleaner::new(parameters)),
+         and dust leave them, and known space that is narrower than a robot, as rays through glass and open doors leave it. \
+         They become unknown, which says nothing for or against a place.",
+        |parameters: MapCleanerParameters, _| Ok(MapCleaner { parameters }),
     )
     .input("map", "The robots' maps.", MapCleaner::receive_map)
     .build()

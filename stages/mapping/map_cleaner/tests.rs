@@ -1,11 +1,9 @@
 //! Cleaning of small maps that are drawn by hand.
 
 use super::passages::wide_known_space;
-use super::{MapCleanerParameters, clean, frame_of_sheet, kind};
+use super::{MapCleanerParameters, clean};
 use crate::shared::geometry::{CellBox, Grid, GridGeometry, UNKNOWN, is_known, pose};
-use gridweave_runtime::message::LogTime;
-use gridweave_runtime::ros::{MapMetaData, OccupancyGrid};
-use gridweave_runtime::stage::{Parameters, StageHarness};
+use gridweave_runtime::stage::Parameters;
 use proptest::prelude::*;
 
 const WIDTH: usize = 60;
@@ -46,56 +44,6 @@ fn single_cells_and_small_objects_become_unknown() {
 fn a_wall_that_lacks_cells_stays_whole() {
     let (before, after) = cleaned(|column, row| if column % 4 == 0 { 0 } else { room(column, row) });
     assert_eq!(before, after);
-}
-
-/// Whether a cell belongs to the frame of a sheet, or to the title block in its corner.
-fn is_frame(column: usize, row: usize) -> bool {
-    let is_block = row == 30 && column >= 40 || column == 40 && row >= 30;
-    !(1..WIDTH - 1).contains(&column) || !(1..HEIGHT - 1).contains(&row) || is_block
-}
-
-/// A sheet that shows the room.
-fn sheet(column: usize, row: usize) -> i8 {
-    if is_frame(column, row) { 100 } else { room(column, row) }
-}
-
-fn cells(value: impl Fn(usize, usize) -> i8) -> Vec<i8> {
-    (0..WIDTH * HEIGHT).map(|index| value(index % WIDTH, index / WIDTH)).collect()
-}
-
-#[test]
-fn the_frame_of_a_sheet_has_its_title_block_and_a_room_is_no_sheet() {
-    let geometry = GridGeometry { width: WIDTH, height: HEIGHT, resolution: RESOLUTION, origin: pose(1.0, 2.0, 0.3) };
-    let frame = |cells: &[i8]| frame_of_sheet(&Grid::new(geometry, cells).unwrap());
-    let mut found = frame(&cells(sheet)).unwrap();
-    found.cells.sort_unstable();
-    let expected = (0..WIDTH * HEIGHT).filter(|place| is_frame(place % WIDTH, place / WIDTH));
-    assert_eq!(found.cells, expected.collect::<Vec<_>>());
-    assert!(found.is_as_large(&[3.0, 2.0]) && !found.is_as_large(&[3.0, 2.1]), "{:?}", found.size);
-    // All walls are connected; much is unknown; one side has a wide door.
-    let connected = |column: usize, row: usize| if column == 20 { 100 } else { sheet(column, row) };
-    let unknown = |column: usize, row: usize| if column < 30 && row > 25 { UNKNOWN } else { sheet(column, row) };
-    let open = |column: usize, row: usize| if (20..30).contains(&column) { 0 } else { sheet(column, row) };
-    assert_eq!((frame(&cells(connected)), frame(&cells(unknown)), frame(&cells(open))), (None, None, None));
-    assert_eq!((frame(&cells(room)), frame(&cells(|_, _| 0)), frame(&cells(|_, _| 100))), (None, None, None));
-}
-
-#[test]
-fn of_several_sheets_with_one_frame_only_the_first_keeps_it() {
-    let mut stage = StageHarness::new(&kind(), "").unwrap();
-    let mut clean = |robot: &str, cells: &[i8]| {
-        let data: Vec<u8> = cells.iter().map(|value| value.cast_unsigned()).collect();
-        let info = MapMetaData { resolution: 0.05, width: WIDTH as u32, height: HEIGHT as u32, ..Default::default() };
-        let map = OccupancyGrid { info, data: &data, ..Default::default() };
-        stage.give::<OccupancyGrid<'_>>("map", robot, LogTime(1), &map).unwrap();
-        let sent = stage.take_messages("map").pop().unwrap();
-        (sent.decode::<OccupancyGrid<'_>>().unwrap().cells().to_vec(), stage.warnings().len())
-    };
-    let whole = cells(sheet);
-    let cleared = cells(|column, row| if is_frame(column, row) { UNKNOWN } else { room(column, row) });
-    for (robot, expected, warnings) in [("a", &whole, 0), ("b", &cleared, 1), ("a", &whole, 1), ("b", &cleared, 1)] {
-        assert_eq!(clean(robot, &whole), (expected.clone(), warnings), "{robot}");
-    }
 }
 
 #[test]
