@@ -31,9 +31,6 @@ pub fn kind() -> StageKind {
     .build()
 }
 
-/// Why the map of a robot would be mirrored.
-const UPSIDE_DOWN: &str = "its scans turn against its odometry, as those of a lidar that is mounted upside down. Log its mount on \
-                           /tf_static with a roll of 180 degrees, or give it: --lidar ROBOT=X,Y,YAW,ROLL with a roll of 3.1416";
 /// From so many scans on a robot has probably moved.
 const SCANS_OF_A_DRIVE: usize = 50;
 
@@ -204,7 +201,7 @@ impl ScanMapper {
             return send_lost(name, &reason, output);
         }
         if robot.is_mirrored() {
-            return send_lost(name, UPSIDE_DOWN, output);
+            return send_lost(name, &upside_down(name), output);
         }
         for (time, odometry) in robot.take_odometry() {
             send_pose(name, robot, time, &odometry, output)?;
@@ -247,7 +244,9 @@ fn explain(
         ));
     }
     if let Some(scans) = robot.unused_scans() {
-        let reason = format!("none of its {scans} scans is used, as there is no pose of it for their times");
+        let reason = format!(
+            "none of its {scans} scans is used: there is no pose of it for their times, or its map would get too large"
+        );
         return send_lost(name, &reason, output);
     }
     if robot.drawn.is_some() && robot.lost().is_none() && robot.map().0.is_none() {
@@ -255,6 +254,14 @@ fn explain(
         return send_lost(name, &reason, output);
     }
     Ok(())
+}
+
+/// Why the map of a robot would be mirrored.
+fn upside_down(name: &str) -> String {
+    format!(
+        "its scans turn against its odometry, as those of a lidar that is mounted upside down. Log its mount on /tf_static \
+         with a roll of 180 degrees, or give it: --lidar {name}=X,Y,YAW,3.1416"
+    )
 }
 
 /// Sends the reason why a robot has no map.
