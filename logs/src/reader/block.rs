@@ -6,7 +6,7 @@ use super::compressed::{ZSTD_MAGIC, decompress_messages};
 use super::damage::{ChunkFault, LARGEST};
 use super::definitions::Definitions;
 use super::record::{MessageRecord, record_at};
-use super::ros1::BagChunk;
+use super::ros1::{BagChunk, convert_messages};
 use super::sqlite::Rows;
 use super::storage::Storage;
 use mcap::records::op;
@@ -96,13 +96,18 @@ impl Block {
         memory: Memory,
         room: u64,
     ) -> Result<LoadedBlock, ChunkFault> {
-        let (records, lost) = match (&self.records, storage) {
+        let (mut records, mut lost) = match (&self.records, storage) {
             (Records::Rows(rows), Storage::Sqlite(database)) => database.contents(rows)?,
             (Records::Ros1(chunk), Storage::Ros1(bag)) => chunk.messages(bag)?,
             (_, Storage::Mcap(file)) => (self.contents(file, memory.records)?, 0),
             _ => return Err(ChunkFault::Records),
         };
-        let index = Index::of(&records, self.may_be_cut(), memory.messages)?;
+        let mut index = Index::of(&records, self.may_be_cut(), memory.messages)?;
+        if !definitions.ros1().is_empty() {
+            let (converted, unreadable) = convert_messages(&records, definitions)?;
+            (records, lost) = (converted, lost + unreadable);
+            index = Index::of(&records, false, index.messages)?;
+        }
         if !index.may_be_compressed {
             return Ok(LoadedBlock { records, messages: index.messages, lost, later: 0, is_decompressed: false });
         }

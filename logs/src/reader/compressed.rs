@@ -4,9 +4,8 @@ use super::bytes::FileBytes;
 use super::chunk::decompress_zstd;
 use super::damage::ChunkFault;
 use super::definitions::Definitions;
-use super::record::{MessageRecord, push_message, record_at};
+use super::record::copy_messages;
 use crate::temporary;
-use mcap::records::op;
 use std::io::{self, Read, Write};
 
 /// The magic bytes of a zstd frame. CDR messages start with a zero.
@@ -15,20 +14,13 @@ pub(crate) const ZSTD_MAGIC: &[u8] = b"\x28\xb5\x2f\xfd";
 /// Copies the messages in `records`, with individually compressed ones decompressed, to at most `most` bytes. A message
 /// that cannot be decompressed is unchanged.
 pub(crate) fn decompress_messages(records: &[u8], definitions: &Definitions, most: u64) -> Result<Vec<u8>, ChunkFault> {
-    let mut decompressed = Vec::new();
-    let mut position = 0;
-    while let Some(record) = record_at(records, position) {
-        position = record.end();
-        if record.opcode != op::MESSAGE {
-            continue;
-        }
-        let message = MessageRecord::parse(record.body).ok_or(ChunkFault::Records)?;
-        let MessageRecord { channel, sequence, log_time, publish_time, data } = message;
+    let (decompressed, _) = copy_messages(records, |channel, data, copy| {
         let is_compressed = data.starts_with(ZSTD_MAGIC) && definitions.is_cdr(channel);
-        let room = most.saturating_sub(decompressed.len() as u64);
+        let room = most.saturating_sub(copy.len() as u64);
         let whole = if is_compressed { decompress(data, room)? } else { None };
-        push_message(&mut decompressed, channel, sequence, log_time, publish_time, whole.as_deref().unwrap_or(data));
-    }
+        copy.extend_from_slice(whole.as_deref().unwrap_or(data));
+        Ok(true)
+    })?;
     Ok(decompressed)
 }
 

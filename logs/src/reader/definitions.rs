@@ -1,9 +1,13 @@
 //! The channels and schemas that a log describes.
 
 use super::record::{Fields, Record};
+use super::ros1::{self, Converted};
+use crate::dynamic::Recoder;
+use crate::qos;
 use gridweave_runtime::message::Channel;
 use mcap::records::op;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// The maximum number of channels in a log: their numbers have 16 bits, and 0 and 65535 are reserved.
 pub(crate) const MOST_CHANNELS: usize = 65534;
@@ -17,6 +21,8 @@ const MOST_BYTES: usize = 64 << 20;
 pub(crate) struct Definitions {
     schemas: BTreeMap<u16, Schema>,
     channels: BTreeMap<u16, ChannelRecord>,
+    /// The converters of ROS 1 messages, by channel. Channels of one schema share theirs.
+    ros1: BTreeMap<u16, Arc<Recoder>>,
     /// The number of redefinitions that differ.
     pub(crate) redefined: usize,
 }
@@ -86,6 +92,37 @@ impl Definitions {
             left > 0
         });
         before - self.channels.len()
+    }
+
+    /// Describes ROS 1 channels as ROS 2 ones. Their messages are yet to be converted, by [`Self::ros1`]. A channel whose
+    /// definition cannot be used is unchanged.
+    pub(crate) fn convert_ros1(&mut self) {
+        let mut recoders = BTreeMap::new();
+        for (id, schema) in self.schemas.iter_mut().filter(|(_, schema)| schema.encoding == ros1::DEFINITION) {
+            if let Some(converted) = Converted::of(&schema.name, &String::from_utf8_lossy(&schema.text)) {
+                let Converted { type_name: name, definition, recoder } = converted;
+                *schema = Schema { name, encoding: "ros2msg".to_owned(), text: definition.into_bytes() };
+                recoders.insert(*id, Arc::new(recoder));
+            }
+        }
+        for (id, channel) in self.channels.iter_mut().filter(|(_, channel)| channel.message_encoding == ros1::MESSAGES)
+        {
+            let Some(recoder) = recoders.get(&channel.schema) else { continue };
+            self.ros1.insert(*id, Arc::clone(recoder));
+            channel.message_encoding = "cdr".to_owned();
+            // A name without a slash at its beginning is relative to the root, as in `rosbag play`.
+            if !channel.topic.starts_with('/') {
+                channel.topic.insert(0, '/');
+            }
+            let is_latching = matches!(channel.metadata.remove(ros1::LATCHING).as_deref(), Some("1" | "true"));
+            let offered = if is_latching { qos::LATCHED } else { "" };
+            channel.metadata.insert(qos::KEY.to_owned(), offered.to_owned());
+        }
+    }
+
+    /// The converters of the messages of ROS 1 channels, by channel.
+    pub(crate) fn ros1(&self) -> &BTreeMap<u16, Arc<Recoder>> {
+        &self.ros1
     }
 
     /// Whether the messages of a channel are encoded as CDR.

@@ -66,6 +66,7 @@ impl LogFile {
             }
         };
         let removed = layout.definitions.limit();
+        layout.definitions.convert_ros1();
         layout.damage.extend((removed > 0).then_some(Damage::ManyDefinitions { count: removed }));
         let loss = layout.damage.iter().find(|damage| !matches!(damage, Damage::Incomplete { .. }));
         match loss {

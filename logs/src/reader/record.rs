@@ -1,5 +1,6 @@
 //! MCAP records: an opcode, the length of the body, and the body, borrowed from the file.
 
+use super::damage::ChunkFault;
 use mcap::records::op;
 
 /// The length of a record's header: the opcode and the length of the body.
@@ -88,6 +89,39 @@ pub(crate) fn push_message(
     records.extend_from_slice(&log_time.to_le_bytes());
     records.extend_from_slice(&publish_time.to_le_bytes());
     records.extend_from_slice(data);
+}
+
+/// Copies the messages in `records`, and nothing else. `append` appends the data of each to the copy, given its channel
+/// and the data that it has; on `false`, the message is left out. Returns the copy, and the number of messages left out.
+///
+/// # Errors
+/// A message record is too short, or the error of `append`.
+pub(crate) fn copy_messages(
+    records: &[u8],
+    mut append: impl FnMut(u16, &[u8], &mut Vec<u8>) -> Result<bool, ChunkFault>,
+) -> Result<(Vec<u8>, u64), ChunkFault> {
+    let (mut copy, mut left_out) = (Vec::new(), 0);
+    let mut position = 0;
+    while let Some(record) = record_at(records, position) {
+        position = record.end();
+        if record.opcode != op::MESSAGE {
+            continue;
+        }
+        let message = MessageRecord::parse(record.body).ok_or(ChunkFault::Records)?;
+        let begin = copy.len();
+        push_message(&mut copy, message.channel, message.sequence, message.log_time, message.publish_time, &[]);
+        match append(message.channel, message.data, &mut copy)? {
+            true => {
+                let length = (copy.len() - begin - HEAD) as u64;
+                copy[begin + 1..begin + HEAD].copy_from_slice(&length.to_le_bytes());
+            }
+            false => {
+                copy.truncate(begin);
+                left_out += 1;
+            }
+        }
+    }
+    Ok((copy, left_out))
 }
 
 /// A reader of little-endian fields; each method returns `None` past the end.

@@ -301,7 +301,7 @@ impl RobotChannels {
                     other.robot = robot;
                     let encoding = &channel.message_encoding;
                     let cure = match encoding == "ros1" {
-                        true => "; give the ROS 1 bag (.bag) that the log was made from, which is read",
+                        true => ", and its definition cannot be read; give the ROS 1 bag (.bag) it was made from",
                         false => "",
                     };
                     other.mismatch = Some(format!(

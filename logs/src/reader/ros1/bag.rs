@@ -1,10 +1,7 @@
-//! A ROS 1 bag: its chunks, and the conversion of its messages to ROS 2.
+//! A ROS 1 bag: its connections and chunks.
 
-use super::MAGIC;
-use super::definition::{translate, type_name};
 use super::record::{BAG, CHUNK, CONNECTION, Header, INDEX, MESSAGE, record_at, record_in, time};
-use crate::dynamic::{Recoder, Schema};
-use crate::qos;
+use super::{DEFINITION, LATCHING, MAGIC, MESSAGES};
 use crate::reader::block::{Block, Records};
 use crate::reader::bytes::{FileBytes, Window};
 use crate::reader::chunk::{decompress_bz2, decompress_lz4};
@@ -16,26 +13,12 @@ use gridweave_runtime::message::Channel;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// The maximum length of the definitions of all connections, bytes. A connection beyond it has no definition.
-const MOST_DEFINITIONS: usize = 32 << 20;
-
 /// A ROS 1 bag.
 #[derive(Debug)]
 pub(crate) struct Bag {
     pub(crate) file: FileBytes,
-    connections: Connections,
-}
-
-/// The connections by their numbers in the bag.
-type Connections = BTreeMap<u32, Connection>;
-
-/// A connection of a bag.
-#[derive(Debug)]
-struct Connection {
-    /// The number of its channel.
-    channel: u16,
-    /// Converts its messages to ROS 2; `None` if their definition cannot be used.
-    recoder: Option<Recoder>,
+    /// The numbers of the channels by those of the connections in the bag.
+    connections: BTreeMap<u32, u16>,
 }
 
 /// A chunk of a bag.
@@ -51,12 +34,7 @@ pub(crate) struct BagChunk {
 impl Bag {
     /// Opens the bag in a file and determines its layout.
     pub(crate) fn open(file: FileBytes) -> (Self, Layout) {
-        let mut walk = Walk {
-            layout: Layout::default(),
-            connections: BTreeMap::new(),
-            unsure: Vec::new(),
-            definitions_left: MOST_DEFINITIONS,
-        };
+        let mut walk = Walk { layout: Layout::default(), connections: BTreeMap::new(), unsure: Vec::new() };
         walk.walk(&file);
         walk.survey(&file);
         let Walk { layout, connections, .. } = walk;
@@ -67,11 +45,9 @@ impl Bag {
 /// The scan of a bag's records.
 struct Walk {
     layout: Layout,
-    connections: Connections,
+    connections: BTreeMap<u32, u16>,
     /// For each block, whether its time span is unknown.
     unsure: Vec<bool>,
-    /// The length that further definitions may have, bytes.
-    definitions_left: usize,
 }
 
 impl Walk {
@@ -137,30 +113,17 @@ impl Walk {
         }
         // Checked above.
         let Ok(channel) = u16::try_from(self.connections.len() + 1) else { return };
-        let mut topic = header.text("topic").or_else(|| data_header.text("topic")).unwrap_or_default();
-        // A name without a slash at its beginning is relative to the root, as in `rosbag play`.
-        if !topic.starts_with('/') {
-            topic.insert(0, '/');
-        }
-        let schema_name = type_name(&data_header.text("type").unwrap_or_default());
-        let definition = data_header.bytes("message_definition").unwrap_or_default();
-        let definition = if definition.len() <= self.definitions_left { definition } else { &[] };
-        self.definitions_left -= definition.len();
-        let schema = translate(&String::from_utf8_lossy(definition));
-        let recoder = Schema::parse(&schema_name, &schema).ok().and_then(Recoder::new);
-        let latched = data_header.bytes("latching") == Some(b"1");
-        let offered = if latched { qos::LATCHED } else { "" };
-        let message_encoding = if recoder.is_some() { "cdr" } else { "ros1" };
+        let latching = data_header.text("latching").unwrap_or_default();
         let description = Channel {
-            topic,
-            message_encoding: message_encoding.to_owned(),
-            schema_name,
-            schema_encoding: "ros2msg".to_owned(),
-            schema: schema.into_bytes(),
-            metadata: BTreeMap::from([(qos::KEY.to_owned(), offered.to_owned())]),
+            topic: header.text("topic").or_else(|| data_header.text("topic")).unwrap_or_default(),
+            message_encoding: MESSAGES.to_owned(),
+            schema_name: data_header.text("type").unwrap_or_default(),
+            schema_encoding: DEFINITION.to_owned(),
+            schema: data_header.bytes("message_definition").unwrap_or_default().to_vec(),
+            metadata: BTreeMap::from([(LATCHING.to_owned(), latching)]),
         };
         self.layout.definitions.insert(channel, description);
-        self.connections.insert(number, Connection { channel, recoder });
+        self.connections.insert(number, channel);
     }
 
     /// Scans chunks whose time span is unknown, or all chunks if some may contain connections that are described
@@ -222,12 +185,10 @@ impl BagChunk {
         }
     }
 
-    /// The messages of the chunk as MCAP records, in CDR; and the number of messages that do not match their
-    /// definition.
+    /// The messages of the chunk as MCAP records; and the number of unreadable ones.
     pub(crate) fn messages(&self, bag: &Bag) -> Result<(Vec<u8>, u64), ChunkFault> {
         let contents = self.contents(&bag.file)?;
-        let (mut records, mut lost) = (Vec::with_capacity(contents.len() + contents.len() / 4), 0);
-        let mut message = Vec::new();
+        let (mut records, mut lost) = (Vec::with_capacity(contents.len()), 0);
         let (mut position, mut sequence) = (0, 0_u32);
         while let Some((header, data, end)) = record_at(&contents, position) {
             position = end;
@@ -239,21 +200,8 @@ impl BagChunk {
                 continue;
             };
             sequence = sequence.wrapping_add(1);
-            let connection = bag.connections.get(&number);
-            let channel = connection.map_or(0, |connection| connection.channel);
-            message.clear();
-            match connection.and_then(|connection| connection.recoder.as_ref()) {
-                None => message.extend_from_slice(data),
-                Some(recoder) if recoder.append_ros1(data, &mut message).is_err() => {
-                    lost += 1;
-                    continue;
-                }
-                Some(_) => {}
-            }
-            if (records.len() + message.len()) as u64 > LARGEST {
-                return Err(ChunkFault::TooLarge);
-            }
-            push_message(&mut records, channel, sequence, time, time, &message);
+            let channel = bag.connections.get(&number).copied().unwrap_or(0);
+            push_message(&mut records, channel, sequence, time, time, data);
         }
         if position != contents.len() {
             lost += 1;

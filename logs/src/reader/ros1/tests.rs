@@ -2,9 +2,12 @@ use super::definition::{translate, type_name};
 use crate::dynamic::{FieldPath, Schema};
 use crate::reader::tests::read_file;
 use crate::reader::{ChunkFault, Damage, LogFile};
-use crate::test_log::Folder;
+use crate::test_log::{Folder, layouts};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, PoseStamped, RosMessage, decode};
+use mcap::records::MessageHeader;
+use std::collections::BTreeMap;
+use std::io::Cursor;
 
 const POSE: &str = "\
 # A pose.
@@ -156,6 +159,40 @@ fn messages_are_read_by_time_and_converted_to_ros_2() {
         let field: FieldPath = "header.stamp.sec".parse().unwrap();
         assert_eq!(schema.decode(&messages[0].2).unwrap().find(&field).unwrap().to_string(), "3");
         assert_eq!(file.container(), "ROS 1 bag");
+    }
+}
+
+#[test]
+fn ros_1_messages_in_mcap_are_converted_too() {
+    let folder = Folder::new();
+    for (options, latching) in layouts().into_iter().zip(["true", "1", "", "false"]) {
+        let mut log = mcap::Writer::with_options(Cursor::new(Vec::new()), options.profile("ros1")).unwrap();
+        let schema = log.add_schema("geometry_msgs/PoseStamped", "ros1msg", POSE.as_bytes()).unwrap();
+        let unusable = log.add_schema("a/B", "ros1msg", b"C c").unwrap();
+        let metadata = BTreeMap::from([("latching".to_owned(), latching.to_owned())]);
+        let poses = log.add_channel(schema, "robot1/pose", "ros1", &metadata).unwrap();
+        let other = log.add_channel(unusable, "/raw", "ros1", &BTreeMap::new()).unwrap();
+        let messages = [(poses, pose(1.0)), (other, b"raw".to_vec()), (poses, b"short".to_vec()), (poses, pose(2.0))];
+        for (time, (channel_id, data)) in (1_u64..).zip(messages) {
+            let header = MessageHeader { channel_id, sequence: 9, log_time: time, publish_time: time };
+            log.write_to_known_channel(&header, &data).unwrap();
+        }
+        log.finish().unwrap();
+        let path = folder.write("a.mcap", &log.into_inner().into_inner());
+        let (messages, damage) = read_file(&path).unwrap();
+        assert_eq!(damage, [Damage::LostMessages { count: 1 }]);
+        let found: Vec<(&str, u64)> = messages.iter().map(|(topic, time, _)| (topic.as_str(), *time)).collect();
+        assert_eq!(found, [("/robot1/pose", 1), ("/raw", 2), ("/robot1/pose", 4)]);
+        assert_eq!(decode::<PoseStamped>(&messages[0].2).unwrap(), expected(1.0));
+        assert_eq!(decode::<PoseStamped>(&messages[2].2).unwrap(), expected(2.0));
+        assert_eq!(messages[1].2, b"raw");
+        let channels: Vec<_> = LogFile::open(&path).unwrap().channels().map(|(_, channel)| channel).collect();
+        assert_eq!(
+            (channels[0].schema_name.as_str(), channels[0].message_encoding.as_str()),
+            (PoseStamped::NAME, "cdr")
+        );
+        assert_eq!(crate::qos::is_transient_local(&channels[0].metadata), ["true", "1"].contains(&latching));
+        assert_eq!(channels[1].message_encoding, "ros1");
     }
 }
 
