@@ -3,7 +3,7 @@
 
 use super::file_names::robot_names;
 use super::{Input, NameError};
-use crate::robots::{RobotChannels, Role};
+use crate::robots::{RobotChannels, Role, is_scan};
 use crate::schemas::full_type_name;
 use crate::tf::tf_topic;
 use gridweave_runtime::message::Channel;
@@ -64,15 +64,10 @@ fn robotless_topics<'a>(channels: &[&'a Channel], robots: &RobotTopics) -> BTree
 
 /// Whether a channel's type is one that a robot has one topic of: map, pose, transforms, scans.
 fn is_of_a_robot(channel: &Channel) -> bool {
-    const TYPES: [&str; 6] = [
-        OccupancyGrid::NAME,
-        Odometry::NAME,
-        PoseStamped::NAME,
-        PoseWithCovarianceStamped::NAME,
-        TagRange::NAME,
-        "sensor_msgs/msg/LaserScan",
-    ];
-    TYPES.contains(&&*full_type_name(&channel.schema_name)) || tf_topic(channel).is_some()
+    const TYPES: [&str; 5] =
+        [OccupancyGrid::NAME, Odometry::NAME, PoseStamped::NAME, PoseWithCovarianceStamped::NAME, TagRange::NAME];
+    let type_name = full_type_name(&channel.schema_name);
+    TYPES.contains(&&*type_name) || is_scan(&type_name) || tf_topic(channel).is_some()
 }
 
 /// The path that a log is named after: the folder of a bag instead of its description, and a compressed file without

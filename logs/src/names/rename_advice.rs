@@ -49,9 +49,14 @@ pub fn rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -
 }
 
 /// The option `--rename` that puts the scans on `topics` under the names of their robots, where `pattern` is the topic
-/// that scans are expected on; `None` if a topic fits, or if the topics do not show which robots there are.
+/// that scans are expected on; `None` if a topic fits, or if the topics do not show which robots there are. Point clouds
+/// that SLAM has put into its map are no scans.
 pub fn scan_rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -> Option<String> {
-    let topics: BTreeSet<&str> = topics.collect();
+    let in_map = |topic: &str| {
+        let name = topic.rsplit('/').next().unwrap_or(topic);
+        ["map", "registered", "aggregated", "assembled"].iter().any(|word| name.contains(word))
+    };
+    let topics: BTreeSet<&str> = topics.filter(|topic| !in_map(topic)).collect();
     if topics.iter().any(|topic| match_robot(pattern, topic).is_some()) {
         return None;
     }

@@ -1,6 +1,6 @@
 //! The role of each channel in a log, decided by its topic and its message type.
 
-use super::scans::is_scan;
+use super::scan_topics::ScanTopics;
 use super::tag_reader::{TagReader, has_poses_in_tf, known_fields};
 use crate::schemas::full_type_name;
 use crate::tf::tf_topic;
@@ -89,6 +89,7 @@ pub(crate) struct RobotChannels {
     mapped: BTreeSet<String>,
     /// Robots with scans and without maps.
     scanned: BTreeSet<String>,
+    scan_topics: ScanTopics,
     /// Robots with an odometry topic.
     with_odometry: BTreeSet<String>,
 }
@@ -96,6 +97,8 @@ pub(crate) struct RobotChannels {
 impl RobotChannels {
     /// Creates a classifier for logs with these channels.
     pub(crate) fn new<'a>(topics: RobotTopics, channels: impl Iterator<Item = &'a Channel>) -> Self {
+        let channels: Vec<&Channel> = channels.collect();
+        let scan_topics = ScanTopics::new(&topics.scan, &channels);
         let mut roles = Self {
             map_updates: format!("{}_updates", topics.map),
             topics,
@@ -108,10 +111,10 @@ impl RobotChannels {
             has_cameras: false,
             mapped: BTreeSet::new(),
             scanned: BTreeSet::new(),
+            scan_topics,
             with_odometry: BTreeSet::new(),
         };
         let (mut asking, mut with_poses) = (BTreeSet::new(), BTreeSet::new());
-        let channels: Vec<&Channel> = channels.collect();
         let maps = channels.iter().map(|channel| roles.classify(channel)).filter(|channel| channel.role == Role::Map);
         let with_maps: BTreeSet<&str> = maps.map(|channel| channel.robot).collect();
         let scanned = channels.iter().filter_map(|channel| roles.scanning_robot(channel));
@@ -186,8 +189,7 @@ impl RobotChannels {
 
     /// The robot of a channel with scans, whether or not the robot has a map.
     pub(crate) fn scanning_robot<'a>(&self, channel: &'a Channel) -> Option<&'a str> {
-        let holds_scans = channel.message_encoding == "cdr" && is_scan(&full_type_name(&channel.schema_name));
-        match_robot(&self.topics.scan, &channel.topic).filter(|robot| holds_scans && fits(robot))
+        self.scan_topics.robot(channel).filter(|robot| fits(robot))
     }
 
     /// Robots with maps, sorted by name.

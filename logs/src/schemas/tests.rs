@@ -327,6 +327,17 @@ fn scans_agree_with_their_definitions() {
         intensities: vec![beam(&[7.0])],
         ..Default::default()
     });
+    assert_agrees(&PointCloud2 {
+        header: header(),
+        height: 2,
+        width: 3,
+        fields: vec![PointField { name: "x".into(), offset: 4, datatype: PointField::FLOAT32, count: 1 }],
+        is_bigendian: true,
+        point_step: 5,
+        row_step: 15,
+        data: &[7; 30],
+        is_dense: true,
+    });
     assert_agrees(&RangeScan {
         header: header(),
         x: 0.25,

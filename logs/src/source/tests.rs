@@ -14,6 +14,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 mod batches;
+mod clouds;
 mod inferred_poses;
 mod map_kinds;
 mod map_updates;

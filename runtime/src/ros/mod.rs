@@ -1,7 +1,7 @@
 //! The ROS 2 messages that stages exchange, and their encoding (CDR).
 //!
 //! The types mirror the `.msg` files field by field. Units are SI, angles are in radians, and the header names the
-//! frame. [`OccupancyGrid`] borrows its cells; the other types are small and own their data.
+//! frame. [`OccupancyGrid`] and [`PointCloud2`] borrow their contents; the other types are small and own their data.
 
 pub mod cell;
 mod codec;
@@ -33,7 +33,7 @@ pub use icp::IcpErrors;
 pub use machine::{MachineStages, StageProgress};
 pub use map_msgs::OccupancyGridUpdate;
 pub use nav::{GridError, GridPrefix, MapMetaData, OccupancyGrid, Odometry, Path};
-pub use sensor::{LaserEcho, LaserScan, MultiEchoLaserScan};
+pub use sensor::{LaserEcho, LaserScan, MultiEchoLaserScan, PointCloud2, PointField};
 pub use std_msgs::{Header, Time};
 pub use tags::{CommonTag, CommonTags, TagBearing, TagEstimate, TagEstimates, TagPosition, TagRange};
 pub use topological::{TopologicalMap, TopologicalNode, TopologicalPath};

@@ -1,6 +1,6 @@
 //! `sensor_msgs`.
 
-use super::{Header, ros_messages};
+use super::{Header, RosMessage, ros_messages};
 use serde::{Deserialize, Serialize};
 
 /// `sensor_msgs/msg/LaserScan`: a scan of a lidar that rotates about its axis.
@@ -51,4 +51,53 @@ pub struct MultiEchoLaserScan {
     pub intensities: Vec<LaserEcho>,
 }
 
-ros_messages!("sensor_msgs": LaserScan, LaserEcho, MultiEchoLaserScan);
+/// `sensor_msgs/msg/PointField`: where a value of a point is in its bytes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PointField {
+    /// `x`, `y`, `z` (metres), `intensity` and so on.
+    pub name: String,
+    /// From the first byte of the point.
+    pub offset: u32,
+    /// The type of the value: [`Self::FLOAT32`], [`Self::FLOAT64`] or an integer.
+    pub datatype: u8,
+    /// The number of values.
+    pub count: u32,
+}
+
+impl PointField {
+    /// Four bytes.
+    pub const FLOAT32: u8 = 7;
+    /// Eight bytes.
+    pub const FLOAT64: u8 = 8;
+}
+
+/// `sensor_msgs/msg/PointCloud2`: points in the frame of a sensor, borrowed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PointCloud2<'a> {
+    /// When the points were measured, and the frame of the sensor.
+    pub header: Header,
+    /// The number of rows; 1 if the points are in no order.
+    pub height: u32,
+    /// The number of points in a row.
+    pub width: u32,
+    /// The values of a point.
+    pub fields: Vec<PointField>,
+    /// Whether the bytes of a value begin with the most significant.
+    pub is_bigendian: bool,
+    /// The length of a point, bytes.
+    pub point_step: u32,
+    /// The length of a row, bytes.
+    pub row_step: u32,
+    /// The rows.
+    #[serde(borrow, with = "serde_bytes")]
+    pub data: &'a [u8],
+    /// Whether every point is valid.
+    pub is_dense: bool,
+}
+
+impl RosMessage for PointCloud2<'_> {
+    const NAME: &'static str = "sensor_msgs/msg/PointCloud2";
+    type Borrowed<'a> = PointCloud2<'a>;
+}
+
+ros_messages!("sensor_msgs": PointField, LaserScan, LaserEcho, MultiEchoLaserScan);

@@ -61,7 +61,7 @@ impl DerivedScans {
             output.warn(format!("messages on `{topic}` could not be read as scans"));
             return Ok(());
         };
-        let frame = &scan.header.frame_id;
+        let frame = &scan.header().frame_id;
         if !scans.knows_mount(&route.robot, frame) {
             if let Some(unmounted) = &mut self.unmounted {
                 let first = *unmounted.entry((route.robot.clone(), frame.clone())).or_insert(output.log_time());
@@ -76,6 +76,13 @@ impl DerivedScans {
                 route.robot
             ));
         }
-        output.scans.send(&route.robot, &scans.to_base_frame(&route.robot, scan))
+        match scans.to_base_frame(&route.robot, scan) {
+            Ok(scan) => output.scans.send(&route.robot, &scan),
+            Err(fault) => {
+                route.unreadable += 1;
+                output.warn(format!("a point cloud on `{topic}` could not be read: {fault}"));
+                Ok(())
+            }
+        }
     }
 }

@@ -1,0 +1,130 @@
+//! The topics on which the lidars of robots publish.
+
+use super::scans::is_scan;
+use crate::schemas::full_type_name;
+use gridweave_runtime::message::Channel;
+use gridweave_runtime::ros::{PointCloud2, RosMessage};
+use gridweave_runtime::stage::match_robot;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Topics of point clouds under a robot's name, as drivers of 3D lidars and simulators publish them. Clouds on others
+/// may be those of cameras, or of SLAM in its map.
+const LIDAR_CLOUDS: [&str; 12] = [
+    "points",
+    "velodyne_points",
+    "ouster/points",
+    "os_cloud_node/points",
+    "lidar_points",
+    "lidar/points",
+    "rslidar_points",
+    "livox/lidar",
+    "velodyne/points",
+    "scan/points",
+    "points_raw",
+    "cloud",
+];
+
+/// The topics with the scans of robots: the one that the pipeline names, of scans or point clouds; for a robot that has
+/// none, the first of [`LIDAR_CLOUDS`].
+#[derive(Clone, Debug)]
+pub(super) struct ScanTopics {
+    /// The topic that the pipeline names, with `{robot}`.
+    pattern: String,
+    /// The topics of point clouds by robot.
+    clouds: BTreeMap<String, String>,
+}
+
+impl ScanTopics {
+    /// Chooses the topics from the channels of logs.
+    pub(super) fn new(pattern: &str, channels: &[&Channel]) -> Self {
+        let mut topics = Self { pattern: pattern.to_owned(), clouds: BTreeMap::new() };
+        let by_pattern: BTreeSet<&str> = channels.iter().filter_map(|channel| topics.robot(channel)).collect();
+        let mut ranked: BTreeMap<&str, (usize, &str)> = BTreeMap::new();
+        for channel in channels.iter().filter(|channel| full_type_name(&channel.schema_name) == PointCloud2::NAME) {
+            if let Some((rank, robot)) = cloud_robot(&channel.topic).filter(|(_, robot)| !by_pattern.contains(robot)) {
+                let best = ranked.entry(robot).or_insert((rank, &channel.topic));
+                *best = (*best).min((rank, &channel.topic));
+            }
+        }
+        topics.clouds = ranked.into_iter().map(|(robot, (_, topic))| (robot.to_owned(), topic.to_owned())).collect();
+        topics
+    }
+
+    /// The robot whose scans a channel holds.
+    pub(super) fn robot<'a>(&self, channel: &'a Channel) -> Option<&'a str> {
+        if channel.message_encoding != "cdr" || !is_scan(&full_type_name(&channel.schema_name)) {
+            return None;
+        }
+        let is_chosen = |robot: &&str| self.clouds.get(*robot) == Some(&channel.topic);
+        let by_cloud = || cloud_robot(&channel.topic).map(|(_, robot)| robot).filter(is_chosen);
+        match_robot(&self.pattern, &channel.topic).or_else(by_cloud)
+    }
+}
+
+/// The robot whose lidar publishes point clouds on a topic, and the place of the topic among [`LIDAR_CLOUDS`].
+fn cloud_robot(topic: &str) -> Option<(usize, &str)> {
+    // The first part of `/ouster/points` is no robot.
+    if topic.strip_prefix('/').is_some_and(|name| LIDAR_CLOUDS.contains(&name)) {
+        return None;
+    }
+    let robot = |name: &str| match_robot(&format!("/{{robot}}/{name}"), topic);
+    LIDAR_CLOUDS.iter().enumerate().find_map(|(rank, name)| Some((rank, robot(name)?)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gridweave_runtime::ros::LaserScan;
+
+    fn channel(topic: &str, type_name: &str) -> Channel {
+        Channel {
+            topic: topic.to_owned(),
+            schema_name: type_name.to_owned(),
+            message_encoding: "cdr".to_owned(),
+            ..Default::default()
+        }
+    }
+
+    fn chosen(topics: &[(&str, &str)]) -> Vec<(String, String)> {
+        let channels: Vec<Channel> = topics.iter().map(|(topic, type_name)| channel(topic, type_name)).collect();
+        let of: Vec<&Channel> = channels.iter().collect();
+        let topics = ScanTopics::new("/{robot}/scan", &of);
+        let robot = |channel: &Channel| topics.robot(channel).map(|robot| (robot.to_owned(), channel.topic.clone()));
+        of.into_iter().filter_map(robot).collect()
+    }
+
+    fn pair(robot: &str, topic: &str) -> (String, String) {
+        (robot.to_owned(), topic.to_owned())
+    }
+
+    #[test]
+    fn one_cloud_of_a_robot_without_scans_is_read() {
+        const CLOUD: &str = PointCloud2::NAME;
+        let topics = [
+            ("/a/scan", LaserScan::NAME),
+            ("/a/velodyne_points", CLOUD),
+            ("/b/ouster/points", CLOUD),
+            ("/b/velodyne_points", CLOUD),
+            ("/b/camera/depth/points", CLOUD),
+            ("/c/ouster/points", "sensor_msgs/PointCloud2"),
+            ("/d/scan", CLOUD),
+            ("/d/points", CLOUD),
+            ("/e/points", LaserScan::NAME),
+            ("/f/cloud_registered", CLOUD),
+        ];
+        let expected = [
+            pair("a", "/a/scan"),
+            pair("b", "/b/velodyne_points"),
+            pair("c", "/c/ouster/points"),
+            pair("d", "/d/scan"),
+        ];
+        assert_eq!(chosen(&topics), expected);
+    }
+
+    #[test]
+    fn a_lidar_is_no_robot() {
+        for topic in ["/ouster/points", "/velodyne_points", "/livox/lidar", "/points"] {
+            assert_eq!(chosen(&[(topic, PointCloud2::NAME)]), [], "{topic}");
+        }
+    }
+}
