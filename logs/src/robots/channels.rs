@@ -1,5 +1,6 @@
 //! The role of each channel in a log, decided by its topic and its message type.
 
+use super::driver_topics::DriverTopics;
 use super::scan_topics::ScanTopics;
 use super::tag_reader::{TagReader, has_poses_in_tf, known_fields};
 use crate::schemas::full_type_name;
@@ -62,8 +63,21 @@ pub(crate) struct Classified<'a> {
 
 /// Topic of the robot's pose in its map, as published by AMCL and other localizers.
 const LOCALIZER_POSE: &str = "/{robot}/amcl_pose";
-/// Topic of the robot's odometry.
-const ODOMETRY: &str = "/{robot}/odom";
+/// Topics of odometry under a robot's name, as the drivers of common bases and filters publish it.
+const ODOMETRY: [&str; 12] = [
+    "odom",
+    "odometry/filtered",
+    "platform/odom/filtered",
+    "odometry",
+    "wheel_odom",
+    "wheel/odometry",
+    "platform/odom",
+    "base_controller/odom",
+    "diff_drive_controller/odom",
+    "mobile_base_controller/odom",
+    "husky_velocity_controller/odom",
+    "jackal_velocity_controller/odom",
+];
 
 /// Classifies the channels of logs.
 #[derive(Clone, Debug)]
@@ -90,6 +104,7 @@ pub(crate) struct RobotChannels {
     /// Robots with scans and without maps.
     scanned: BTreeSet<String>,
     scan_topics: ScanTopics,
+    odometry_topics: DriverTopics,
     /// Robots with an odometry topic.
     with_odometry: BTreeSet<String>,
 }
@@ -99,6 +114,8 @@ impl RobotChannels {
     pub(crate) fn new<'a>(topics: RobotTopics, channels: impl Iterator<Item = &'a Channel>) -> Self {
         let channels: Vec<&Channel> = channels.collect();
         let scan_topics = ScanTopics::new(&topics.scan, &channels);
+        let odometry = channels.iter().filter(|channel| full_type_name(&channel.schema_name) == Odometry::NAME);
+        let odometry_topics = DriverTopics::choose(&ODOMETRY, odometry.map(|channel| channel.topic.as_str()));
         let mut roles = Self {
             map_updates: format!("{}_updates", topics.map),
             topics,
@@ -112,6 +129,7 @@ impl RobotChannels {
             mapped: BTreeSet::new(),
             scanned: BTreeSet::new(),
             scan_topics,
+            odometry_topics,
             with_odometry: BTreeSet::new(),
         };
         let (mut asking, mut with_poses) = (BTreeSet::new(), BTreeSet::new());
@@ -321,7 +339,7 @@ impl RobotChannels {
         }
         if is_cdr
             && type_name == Odometry::NAME
-            && let Some(robot) = match_robot(ODOMETRY, topic).filter(|robot| self.unposed.contains(*robot))
+            && let Some(robot) = self.odometry_topics.robot(topic).filter(|robot| self.unposed.contains(*robot))
         {
             return Classified { role: Role::Odometry, robot, mismatch: None };
         }

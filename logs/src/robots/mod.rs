@@ -2,6 +2,7 @@
 
 mod cell_values;
 mod channels;
+mod driver_topics;
 mod inferred_poses;
 mod merged_maps;
 mod mounts;

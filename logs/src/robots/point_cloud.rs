@@ -1,13 +1,22 @@
 //! A level slice of the point cloud of a 3D lidar: what a 2D lidar at its place would measure.
 
-use gridweave_runtime::ros::{PointCloud2, PointField};
-use nalgebra::{UnitQuaternion, Vector3};
+mod points;
+mod sweep;
+
+use gridweave_runtime::message::LogTime;
+use gridweave_runtime::ros::PointCloud2;
+use nalgebra::UnitQuaternion;
+use points::Points;
 use std::f64::consts::{PI, TAU};
-use std::fmt;
 use std::ops::RangeInclusive;
+use sweep::Sweep;
+
+pub(crate) use points::CloudFault;
 
 /// The number of directions of a slice. Common 3D lidars measure 900 to 2048.
 const DIRECTIONS: usize = 1080;
+/// The angle from one direction to the next, radians.
+const STEP: f64 = TAU / DIRECTIONS as f64;
 /// The points nearer than this are of the robot itself, metres.
 pub(crate) const NEAREST: f32 = 0.5;
 /// The heights of the slice above a lidar, metres. Walls are seen above it as well as beside it, but below it is the
@@ -16,40 +25,34 @@ const ABOVE_LIDAR: RangeInclusive<f64> = -0.2..=0.5;
 /// The heights of the slice above the base, of points that their driver has transformed there: they do not show how
 /// high the lidar is.
 const ABOVE_BASE: RangeInclusive<f64> = 0.2..=0.9;
+/// The greatest time between the stamp of a cloud and its first point, seconds.
+const LONGEST_BEFORE: f64 = 1.0;
 
-/// Why the points of a cloud cannot be read.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum CloudFault {
-    /// There is no such field of one floating-point number.
-    Field(&'static str),
-    /// The data are shorter than the rows that the cloud states.
-    Short,
-}
-
-impl fmt::Display for CloudFault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Field(name) => write!(f, "its points have no field `{name}` that is one floating-point number"),
-            Self::Short => write!(f, "its data are shorter than its rows"),
-        }
-    }
-}
-
-impl std::error::Error for CloudFault {}
-
-/// The ranges in [`DIRECTIONS`] directions, from behind over the right, ahead and the left, in a frame that is level
-/// with the base and has its origin at the sensor: the nearest point of each, metres; not a number where there is none.
+/// The nearest point in each of [`DIRECTIONS`] directions, in a frame that is level with the base and has its origin at
+/// the sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Slice {
+    /// The distances, metres; not a number where there is no point. In the order in which they were measured, where the
+    /// times of the points show it.
     pub(crate) ranges: Vec<f32>,
+    /// The first direction, radians.
+    pub(crate) angle_min: f64,
+    /// The angle from one direction to the next, radians.
+    pub(crate) angle_increment: f64,
+    /// The time from one direction to the next, seconds; 0 if it is unknown.
+    pub(crate) time_increment: f64,
+    /// The time of the first direction after the stamp of the cloud, seconds.
+    pub(crate) begin: f64,
+}
+
+/// The nearest point in a direction: the square of its distance (metres), and its time (seconds).
+#[derive(Clone, Copy)]
+struct Nearest {
+    squared: f64,
+    time: Option<f64>,
 }
 
 impl Slice {
-    /// The angle of the first direction, radians.
-    pub(crate) const ANGLE_MIN: f64 = -PI + Self::ANGLE_INCREMENT / 2.0;
-    /// The angle from one direction to the next, radians.
-    pub(crate) const ANGLE_INCREMENT: f64 = TAU / DIRECTIONS as f64;
-
     /// Takes the slice of a cloud from a sensor that is turned by `rotation` against the base. `is_base` is whether the
     /// points are in the frame of the base.
     ///
@@ -62,84 +65,70 @@ impl Slice {
     ) -> Result<Self, CloudFault> {
         let heights = if is_base { ABOVE_BASE } else { ABOVE_LIDAR };
         let rotation = rotation.to_rotation_matrix();
-        let nearest = f64::from(NEAREST) * f64::from(NEAREST);
-        let mut squared = vec![f64::INFINITY; DIRECTIONS];
-        for_each_point(cloud, |point| {
+        let least = f64::from(NEAREST) * f64::from(NEAREST);
+        let mut nearest = vec![Nearest { squared: f64::INFINITY, time: None }; DIRECTIONS];
+        Points::of(cloud)?.for_each(|point, time| {
             let point = rotation * point;
-            let distance = point.x * point.x + point.y * point.y;
+            let squared = point.x * point.x + point.y * point.y;
             // A point that is not a number is in no slice.
-            if !heights.contains(&point.z) || !(nearest..f64::INFINITY).contains(&distance) {
+            if !heights.contains(&point.z) || !(least..f64::INFINITY).contains(&squared) {
                 return;
             }
-            let direction = (point.y.atan2(point.x) + PI) / Self::ANGLE_INCREMENT;
-            let least = &mut squared[(direction as usize).min(DIRECTIONS - 1)];
-            *least = least.min(distance);
-        })?;
-        let range = |squared: f64| if squared.is_finite() { squared.sqrt() as f32 } else { f32::NAN };
-        Ok(Self { ranges: squared.into_iter().map(range).collect() })
+            let of_direction = &mut nearest[place(point.y.atan2(point.x))];
+            if squared < of_direction.squared {
+                *of_direction = Nearest { squared, time: time() };
+            }
+        });
+        let measured = nearest.iter().enumerate().filter_map(|(place, point)| Some((point.time?, angle(place))));
+        Ok(match Sweep::of(measured.collect()) {
+            Some(sweep) => Self::in_order(&nearest, &sweep, LogTime::from(cloud.header.stamp).seconds()),
+            None => Self {
+                ranges: nearest.iter().map(Nearest::range).collect(),
+                angle_min: angle(0),
+                angle_increment: STEP,
+                time_increment: 0.0,
+                begin: 0.0,
+            },
+        })
     }
-}
 
-/// Calls `each` with every point, in the order of the data.
-fn for_each_point(cloud: &PointCloud2<'_>, mut each: impl FnMut(Vector3<f64>)) -> Result<(), CloudFault> {
-    let [x, y, z] = ["x", "y", "z"].map(|name| number(cloud, name).ok_or(CloudFault::Field(name)));
-    let (x, y, z) = (x?, y?, z?);
-    let (step, columns) = (cloud.point_step as usize, cloud.width as usize);
-    let length = step.checked_mul(columns).ok_or(CloudFault::Short)?;
-    // A row may be longer than its points. Some drivers state no length of it.
-    let row_step = (cloud.row_step as usize).max(length);
-    let Some(last) = (cloud.height as usize).checked_sub(1).filter(|_| length > 0) else { return Ok(()) };
-    let needed = row_step.checked_mul(last).and_then(|begin| begin.checked_add(length)).ok_or(CloudFault::Short)?;
-    let data = cloud.data.get(..needed).ok_or(CloudFault::Short)?;
-    for row in data.chunks(row_step) {
-        for point in row[..length].chunks_exact(step) {
-            each(Vector3::new(x.read(point), y.read(point), z.read(point)));
+    /// The directions from the first that was measured on.
+    fn in_order(nearest: &[Nearest], sweep: &Sweep, stamp: f64) -> Self {
+        let first = place(sweep.first);
+        let ranges = nearest[first..].iter().chain(&nearest[..first]);
+        let mut ranges: Vec<f32> = ranges.map(Nearest::range).collect();
+        if sweep.rate < 0.0 {
+            // The first direction stays in front.
+            ranges[1..].reverse();
         }
+        // Times are after the stamp, or since 1970.
+        let begins = [sweep.begin, sweep.begin - stamp];
+        let begin = begins.into_iter().find(|begin| begin.abs() <= LONGEST_BEFORE).unwrap_or(0.0);
+        let time_increment = STEP / sweep.rate.abs();
+        Self { ranges, angle_min: angle(first), angle_increment: STEP.copysign(sweep.rate), time_increment, begin }
     }
-    Ok(())
 }
 
-/// Where a floating-point number is in a point.
-struct Number {
-    offset: usize,
-    is_double: bool,
-    is_big_endian: bool,
+impl Nearest {
+    fn range(&self) -> f32 {
+        if self.squared.is_finite() { self.squared.sqrt() as f32 } else { f32::NAN }
+    }
 }
 
-/// The field of a cloud with the given name; `None` if it is not one floating-point number, or ends outside the point.
-fn number(cloud: &PointCloud2<'_>, name: &str) -> Option<Number> {
-    let field = cloud.fields.iter().find(|field| field.name == name && field.count <= 1)?;
-    let (is_double, size) = match field.datatype {
-        PointField::FLOAT32 => (false, 4),
-        PointField::FLOAT64 => (true, 8),
-        _ => return None,
-    };
-    let end = field.offset.checked_add(size)?;
-    let number = Number { offset: field.offset as usize, is_double, is_big_endian: cloud.is_bigendian };
-    (end <= cloud.point_step).then_some(number)
+/// The place of a direction (radians) among all, from behind over the right, ahead and the left.
+fn place(angle: f64) -> usize {
+    ((angle + PI).rem_euclid(TAU) / STEP).min((DIRECTIONS - 1) as f64) as usize
 }
 
-impl Number {
-    /// Reads the number from the bytes of a point; not a number if they end before it.
-    fn read(&self, point: &[u8]) -> f64 {
-        let bytes = point.get(self.offset..).unwrap_or_default();
-        let single = || bytes.first_chunk().map(|bytes| self.ordered(*bytes)).map(f32::from_le_bytes).map(f64::from);
-        let double = || bytes.first_chunk().map(|bytes| self.ordered(*bytes)).map(f64::from_le_bytes);
-        if self.is_double { double() } else { single() }.unwrap_or(f64::NAN)
-    }
-
-    /// The bytes of a number, the least significant first.
-    fn ordered<const N: usize>(&self, mut bytes: [u8; N]) -> [u8; N] {
-        if self.is_big_endian {
-            bytes.reverse();
-        }
-        bytes
-    }
+/// The direction in the middle of a place, radians.
+fn angle(place: usize) -> f64 {
+    (place as f64 + 0.5) * STEP - PI
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gridweave_runtime::ros::{Header, PointField};
 
     fn field(name: &str, offset: u32) -> PointField {
         PointField { name: name.into(), offset, datatype: PointField::FLOAT32, count: 1 }
@@ -157,7 +146,7 @@ mod tests {
 
     /// The measured ranges, in whole centimetres by direction in whole degrees.
     fn found(slice: &Slice) -> Vec<(i64, i64)> {
-        let angle = |place: usize| Slice::ANGLE_MIN + place as f64 * Slice::ANGLE_INCREMENT;
+        let angle = |place: usize| slice.angle_min + place as f64 * slice.angle_increment;
         let measured = slice.ranges.iter().enumerate().filter(|(_, range)| !range.is_nan());
         measured
             .map(|(place, range)| (angle(place).to_degrees().round() as i64, (100.0 * range).round() as i64))
@@ -238,6 +227,40 @@ mod tests {
             PointCloud2 { height: u32::MAX, width: 0, row_step: 0, data: &[], ..good },
         ] {
             assert_eq!(found(&of(empty).unwrap()), []);
+        }
+    }
+
+    /// A wall around a lidar that turns clockwise from `first`, and begins `begin` seconds after zero.
+    fn turning(first: f64, begin: f64) -> Vec<u8> {
+        let point = |number: u32| {
+            let part = f64::from(number) / 1000.0;
+            let angle = first - TAU * part;
+            let position = [3.0 * angle.cos(), 3.0 * angle.sin(), 0.0].map(|number| (number as f32).to_le_bytes());
+            [position.concat(), (begin + 0.1 * part).to_le_bytes().to_vec()].concat()
+        };
+        (0..1000).flat_map(point).collect()
+    }
+
+    #[test]
+    fn the_times_of_points_show_how_the_lidar_turned() {
+        for (stamp, begin) in [(0, -0.1), (1_700_000_000, 1_700_000_000.02)] {
+            let data = turning(1.0, begin);
+            let time = PointField { datatype: PointField::FLOAT64, ..field("timestamp", 12) };
+            let mut turned = cloud(1000, &data);
+            (turned.point_step, turned.row_step) = (20, 20_000);
+            turned.fields.push(time);
+            turned.header = Header { stamp: LogTime(stamp * 1_000_000_000).into(), ..Default::default() };
+            let slice = Slice::of(&turned, &UnitQuaternion::identity(), false).unwrap();
+            assert!((slice.angle_min - 1.0).abs() < 0.02 && slice.angle_increment == -STEP, "{}", slice.angle_min);
+            assert!((slice.time_increment * DIRECTIONS as f64 - 0.1).abs() < 0.001, "{}", slice.time_increment);
+            assert!((slice.begin - if stamp == 0 { -0.1 } else { 0.02 }).abs() < 1e-3, "{}", slice.begin);
+            assert!(slice.ranges.iter().all(|range| range.is_nan() || (range - 3.0).abs() < 0.001));
+            // Upside down it turns the other way.
+            let upside_down = UnitQuaternion::from_euler_angles(PI, 0.0, 0.0);
+            let slice = Slice::of(&turned, &upside_down, false).unwrap();
+            assert!((slice.angle_min + 1.0).abs() < 0.02 && slice.angle_increment == STEP, "{}", slice.angle_min);
+            turned.fields.pop();
+            assert_eq!(Slice::of(&turned, &upside_down, false).unwrap().time_increment, 0.0);
         }
     }
 }

@@ -1,11 +1,12 @@
 //! The topics on which the lidars of robots publish.
 
+use super::driver_topics::DriverTopics;
 use super::scans::is_scan;
 use crate::schemas::full_type_name;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{PointCloud2, RosMessage};
 use gridweave_runtime::stage::match_robot;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 /// Topics of point clouds under a robot's name, as drivers of 3D lidars and simulators publish them. Clouds on others
 /// may be those of cameras, or of SLAM in its map.
@@ -30,23 +31,17 @@ const LIDAR_CLOUDS: [&str; 12] = [
 pub(super) struct ScanTopics {
     /// The topic that the pipeline names, with `{robot}`.
     pattern: String,
-    /// The topics of point clouds by robot.
-    clouds: BTreeMap<String, String>,
+    clouds: DriverTopics,
 }
 
 impl ScanTopics {
     /// Chooses the topics from the channels of logs.
     pub(super) fn new(pattern: &str, channels: &[&Channel]) -> Self {
-        let mut topics = Self { pattern: pattern.to_owned(), clouds: BTreeMap::new() };
+        let mut topics = Self { pattern: pattern.to_owned(), clouds: DriverTopics::default() };
         let by_pattern: BTreeSet<&str> = channels.iter().filter_map(|channel| topics.robot(channel)).collect();
-        let mut ranked: BTreeMap<&str, (usize, &str)> = BTreeMap::new();
-        for channel in channels.iter().filter(|channel| full_type_name(&channel.schema_name) == PointCloud2::NAME) {
-            if let Some((rank, robot)) = cloud_robot(&channel.topic).filter(|(_, robot)| !by_pattern.contains(robot)) {
-                let best = ranked.entry(robot).or_insert((rank, &channel.topic));
-                *best = (*best).min((rank, &channel.topic));
-            }
-        }
-        topics.clouds = ranked.into_iter().map(|(robot, (_, topic))| (robot.to_owned(), topic.to_owned())).collect();
+        let clouds = channels.iter().filter(|channel| full_type_name(&channel.schema_name) == PointCloud2::NAME);
+        topics.clouds = DriverTopics::choose(&LIDAR_CLOUDS, clouds.map(|channel| channel.topic.as_str()));
+        topics.clouds.retain(|robot| !by_pattern.contains(robot));
         topics
     }
 
@@ -55,20 +50,8 @@ impl ScanTopics {
         if channel.message_encoding != "cdr" || !is_scan(&full_type_name(&channel.schema_name)) {
             return None;
         }
-        let is_chosen = |robot: &&str| self.clouds.get(*robot) == Some(&channel.topic);
-        let by_cloud = || cloud_robot(&channel.topic).map(|(_, robot)| robot).filter(is_chosen);
-        match_robot(&self.pattern, &channel.topic).or_else(by_cloud)
+        match_robot(&self.pattern, &channel.topic).or_else(|| self.clouds.robot(&channel.topic))
     }
-}
-
-/// The robot whose lidar publishes point clouds on a topic, and the place of the topic among [`LIDAR_CLOUDS`].
-fn cloud_robot(topic: &str) -> Option<(usize, &str)> {
-    // The first part of `/ouster/points` is no robot.
-    if topic.strip_prefix('/').is_some_and(|name| LIDAR_CLOUDS.contains(&name)) {
-        return None;
-    }
-    let robot = |name: &str| match_robot(&format!("/{{robot}}/{name}"), topic);
-    LIDAR_CLOUDS.iter().enumerate().find_map(|(rank, name)| Some((rank, robot(name)?)))
 }
 
 #[cfg(test)]
@@ -119,12 +102,5 @@ mod tests {
             pair("d", "/d/scan"),
         ];
         assert_eq!(chosen(&topics), expected);
-    }
-
-    #[test]
-    fn a_lidar_is_no_robot() {
-        for topic in ["/ouster/points", "/velodyne_points", "/livox/lidar", "/points"] {
-            assert_eq!(chosen(&[(topic, PointCloud2::NAME)]), [], "{topic}");
-        }
     }
 }

@@ -3,7 +3,7 @@
 use super::mounts::{Mounts, NoTransform};
 use super::point_cloud::{CloudFault, NEAREST, Slice};
 use crate::schemas::full_type_name;
-use gridweave_runtime::message::Channel;
+use gridweave_runtime::message::{Channel, LogTime};
 use gridweave_runtime::ros::{
     DecodeError, Header, LaserEcho, LaserScan, MultiEchoLaserScan, PointCloud2, RangeScan, RosMessage, TFMessage,
     decode,
@@ -84,14 +84,15 @@ impl Scans {
             Scan::Cloud(cloud) => {
                 let is_base = base == lidar && self.mounts.mount(robot, &lidar).is_ok();
                 let slice = Slice::of(&cloud, &transform_base_lidar.rotation, is_base)?;
+                let first = LogTime::from(cloud.header.stamp).plus_seconds(slice.begin);
                 Ok(RangeScan {
-                    header: Header { stamp: cloud.header.stamp, frame_id: base },
+                    header: Header::new(first, base),
                     x: place.x,
                     y: place.y,
                     yaw: 0.0,
-                    angle_min: Slice::ANGLE_MIN,
-                    angle_increment: Slice::ANGLE_INCREMENT,
-                    time_increment: 0.0,
+                    angle_min: slice.angle_min,
+                    angle_increment: slice.angle_increment,
+                    time_increment: slice.time_increment,
                     range_min: NEAREST,
                     range_max: f32::INFINITY,
                     ranges: slice.ranges,

@@ -58,13 +58,15 @@ pub struct PointField {
     pub name: String,
     /// From the first byte of the point.
     pub offset: u32,
-    /// The type of the value: [`Self::FLOAT32`], [`Self::FLOAT64`] or an integer.
+    /// The type of the value, such as [`Self::FLOAT32`].
     pub datatype: u8,
     /// The number of values.
     pub count: u32,
 }
 
 impl PointField {
+    /// Four bytes.
+    pub const UINT32: u8 = 6;
     /// Four bytes.
     pub const FLOAT32: u8 = 7;
     /// Eight bytes.
