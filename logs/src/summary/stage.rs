@@ -2,10 +2,11 @@
 
 use super::{Areas, DeformationSummary, Summary};
 use crate::file::replace;
-use gridweave_runtime::ros::{MapAgreement, MapDeformation, RobotFrames, Verdicts};
+use gridweave_runtime::ros::{MapAgreement, MapDeformation, RobotFrames, UnmergedRobot, Verdicts};
 use gridweave_runtime::stage::{Context, Output, Parameters, Received, StageError, StageKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// The parameters of `summary_sink`.
@@ -29,6 +30,11 @@ pub fn kind() -> StageKind {
     .optional_inputs("verdicts", "the outcome of each pair of robots", SummarySink::verdicts)
     .optional_inputs("agreement", "the agreement of the fused maps", SummarySink::agreement)
     .optional_inputs("deformation", "the deformations of the maps", SummarySink::deformation)
+    .optional_inputs(
+        "localised",
+        "robots that have nothing to be merged, as they localise in one map; listed even if no robot has a map frame",
+        SummarySink::localised,
+    )
     .finish(SummarySink::write)
     .build()
 }
@@ -39,6 +45,8 @@ struct SummarySink {
     /// The stage at the other end of each wire.
     from: Vec<String>,
     summary: Summary,
+    /// Why robots have nothing to be merged.
+    localised: BTreeMap<String, String>,
 }
 
 impl SummarySink {
@@ -48,7 +56,7 @@ impl SummarySink {
             return Err(StageError::new(doing, "it has no file").with_help("give --summary FILE or file = \"FILE\""));
         }
         let from = context.inputs.iter().map(|wire| wire.from.clone()).collect();
-        Ok(Self { file, from, summary: Summary::default() })
+        Ok(Self { file, from, summary: Summary::default(), localised: BTreeMap::new() })
     }
 
     fn frames(&mut self, frames: Received<'_, RobotFrames>, _: &Output<()>) -> Result<(), StageError> {
@@ -75,7 +83,18 @@ impl SummarySink {
         Ok(())
     }
 
+    fn localised(&mut self, localised: Received<'_, UnmergedRobot>, _: &Output<()>) -> Result<(), StageError> {
+        let UnmergedRobot { robot, reason } = localised.into_content();
+        self.localised.insert(robot, reason);
+        Ok(())
+    }
+
     fn write(&mut self, _: &Output<()>) -> Result<(), StageError> {
+        for (robot, reason) in std::mem::take(&mut self.localised) {
+            if !self.summary.frames.contains_key(&robot) {
+                self.summary.unmerged.entry(robot).or_insert(reason);
+            }
+        }
         let failed = |cause: &dyn std::fmt::Display| {
             StageError::new(format!("write the summary {}", self.file.display()), cause)
         };
