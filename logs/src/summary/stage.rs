@@ -1,7 +1,7 @@
 //! The stage `summary_sink`.
 
 use super::{Areas, DeformationSummary, Summary};
-use crate::file::replace;
+use crate::file::replace_or_leave;
 use gridweave_runtime::ros::{MapAgreement, MapDeformation, RobotFrames, UnmergedRobot, Verdicts};
 use gridweave_runtime::stage::{Context, Output, Parameters, Received, StageError, StageKind};
 use schemars::JsonSchema;
@@ -15,6 +15,9 @@ use std::path::PathBuf;
 struct SummaryParameters {
     /// The JSON file to write. An existing file is replaced.
     file: PathBuf,
+    /// Whether the file is left as `FILE.part` when it is whole: the command renames the files of all stages together.
+    /// Set by the command.
+    leave_part: bool,
 }
 
 impl Parameters for SummaryParameters {}
@@ -42,6 +45,7 @@ pub fn kind() -> StageKind {
 /// Stores the latest message of each input.
 struct SummarySink {
     file: PathBuf,
+    leave_part: bool,
     /// The stage at the other end of each wire.
     from: Vec<String>,
     summary: Summary,
@@ -50,13 +54,13 @@ struct SummarySink {
 }
 
 impl SummarySink {
-    fn new(SummaryParameters { file }: SummaryParameters, context: &Context) -> Result<Self, StageError> {
+    fn new(SummaryParameters { file, leave_part }: SummaryParameters, context: &Context) -> Result<Self, StageError> {
         if file.as_os_str().is_empty() {
             let doing = "write the summary";
             return Err(StageError::new(doing, "it has no file").with_help("give --summary FILE or file = \"FILE\""));
         }
         let from = context.inputs.iter().map(|wire| wire.from.clone()).collect();
-        Ok(Self { file, from, summary: Summary::default(), localised: BTreeMap::new() })
+        Ok(Self { file, leave_part, from, summary: Summary::default(), localised: BTreeMap::new() })
     }
 
     fn frames(&mut self, frames: Received<'_, RobotFrames>, _: &Output<()>) -> Result<(), StageError> {
@@ -99,6 +103,6 @@ impl SummarySink {
             StageError::new(format!("write the summary {}", self.file.display()), cause)
         };
         let text = serde_json::to_string_pretty(&self.summary).map_err(|error| failed(&error))? + "\n";
-        replace(&[(&self.file, text.as_bytes())]).map_err(|error| failed(&error))
+        replace_or_leave(&[(&self.file, text.as_bytes())], self.leave_part).map_err(|error| failed(&error))
     }
 }

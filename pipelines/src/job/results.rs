@@ -69,6 +69,11 @@ impl ResultSinks {
         Ok(Self { summary: is_attached.then_some(file), files, _folder: folder })
     }
 
+    /// The file of the summary, which [`summary`](Self::summary) reads.
+    pub(super) fn file(&self) -> Option<&Path> {
+        self.summary.as_deref()
+    }
+
     /// Reads the summary; `None` if the pipeline merges nothing.
     pub(super) fn summary(&self) -> Result<Option<Summary>> {
         let Some(file) = &self.summary else { return Ok(None) };
