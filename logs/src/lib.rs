@@ -11,6 +11,7 @@ pub mod foxglove;
 pub mod info;
 pub mod map_file;
 pub mod names;
+mod one_map;
 mod os_error;
 pub mod picture;
 pub mod qos;

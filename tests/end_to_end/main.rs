@@ -36,6 +36,7 @@ mod merge_output;
 mod methods;
 mod mirrored_tag;
 mod names;
+mod one_map;
 mod output_files;
 mod processes;
 mod python_libraries;

@@ -80,6 +80,61 @@ fn a_run_that_fails_leaves_the_earlier_output_in_its_place() {
 }
 
 #[test]
+fn a_run_that_fails_leaves_the_earlier_summary_of_a_sink_in_its_place() {
+    let folder = TempDir::new().unwrap();
+    let (summary, log) = (folder.path().join("summary.json"), folder.path().join(OUTPUT));
+    let map = format!("{}/golden/map_file_source/three_modes/raw.yaml", env!("CARGO_MANIFEST_DIR"));
+    let pipeline = format!(
+        r#"
+        [stages.files]
+        kind = "map_file_source"
+        files = ["{map}"]
+
+        [stages.aligner]
+        kind = "map_aligner"
+        inputs = ["files"]
+
+        [stages.frames]
+        kind = "frame_solver"
+        inputs = ["files", "aligner"]
+
+        [stages.source]
+        kind = "troubled_source"
+        count = 3
+        gates = [3]
+
+        [stages.summary]
+        kind = "summary_sink"
+        inputs = ["frames.frames"]
+        file = "summary.json"
+
+        [stages.output]
+        kind = "mcap_sink"
+        inputs = ["files", "frames.*", "source"]
+        file = "{OUTPUT}"
+        "#
+    );
+    fs::write(folder.path().join("pipeline.toml"), pipeline).unwrap();
+    fs::write(&summary, "earlier").unwrap();
+    let gate = folder.path().join("gate_3");
+    let args = |engine| ["run", "pipeline.toml", "--engine", engine];
+    for engine in ["threads", "processes"] {
+        let fails = ["--set", "source.at=3", "--set", "source.what=fail"];
+        let failing = start(folder.path(), &[&args(engine)[..], &fails[..]].concat(), &[]);
+        // The source fails when the summary is whole.
+        wait_until("summary", || part(&summary).exists() || fs::read_to_string(&summary).unwrap() != "earlier");
+        fs::write(&gate, b"").unwrap();
+        failing.wait().assert(1, &["as configured"]);
+        assert_eq!(fs::read_to_string(&summary).unwrap(), "earlier", "{engine}");
+        assert!(!part(&summary).exists(), "{engine}");
+        fs::remove_file(&gate).unwrap();
+    }
+    fs::write(&gate, b"").unwrap();
+    gridweave(folder.path(), &args("processes")).assert(0, &[]);
+    assert!(fs::read_to_string(&summary).unwrap().contains("\"frames\"") && log.exists() && !part(&summary).exists());
+}
+
+#[test]
 fn a_run_that_removes_the_part_of_one_that_was_killed_says_so() {
     for engine in ["single", "processes"] {
         let folder = folder();

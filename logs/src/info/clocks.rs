@@ -105,7 +105,8 @@ pub(super) fn notes<'a>(topics: impl Iterator<Item = (&'a str, &'a TopicInfo)>) 
         *span = (span.0.min(topic.first), span.1.max(topic.last));
     }
     let mut notes: Vec<String> = clocks.iter().filter_map(|(robot, clock)| clock.note(robot)).collect();
-    let mut in_order: Vec<(&str, (f64, f64))> = spans.into_iter().collect();
+    // Whose messages are all of one moment, as a map from a file is, did not drive, and shows no clock.
+    let mut in_order: Vec<(&str, (f64, f64))> = spans.into_iter().filter(|(_, (start, end))| start < end).collect();
     in_order.sort_by(|one, other| one.1.0.total_cmp(&other.1.0));
     for pair in in_order.windows(2) {
         let [(one, (_, end)), (other, (start, _))] = pair else { continue };
@@ -152,6 +153,12 @@ mod tests {
         let text = report(&right, &topic(3e8, 3e8 + 100.0, None));
         assert!(text.contains("the log of b starts 9.5 years after the end of a"), "{text}");
         assert!(text.contains("--align-start"));
+    }
+
+    #[test]
+    fn maps_from_files_have_no_clocks_that_could_be_unrelated() {
+        let (map, other, drive) = (topic(1.0, 1.0, None), topic(2.0, 2.0, None), topic(3e8, 3e8 + 100.0, None));
+        assert_eq!(notes([("a", &map), ("b", &other), ("c", &drive)].into_iter()), Vec::<String>::new());
     }
 
     #[test]

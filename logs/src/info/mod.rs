@@ -1,5 +1,6 @@
 //! The contents of logs: topics, robots, and problems.
 
+mod channels;
 mod clocks;
 mod robots;
 mod run;
@@ -7,14 +8,16 @@ mod run;
 #[cfg(test)]
 mod tests;
 
+pub use channels::{holds_tags_alone, robots_with_scans_only};
 pub use clocks::ClockInfo;
 pub use robots::RobotInfo;
 pub use run::RunInfo;
 
 use crate::names::{self, Input, NameError, NameRules, Names, Renamed};
+use crate::one_map::OneMap;
 use crate::qos;
 use crate::reader::{Damage, LogFile, LogReader};
-use crate::robots::{RobotChannels, Role};
+use crate::robots::Role;
 use clocks::HeaderPlace;
 use gridweave_runtime::message::{Channel, LogTime};
 use gridweave_runtime::stage::RobotTopics;
@@ -160,6 +163,7 @@ fn look(inputs: &[Input], rules: &NameRules, robots: &RobotTopics, large: u64) -
     }
     let mut topics = Topics { known: vec![Vec::new(); files.len()], entries: Vec::new() };
     let mut survey = RobotSurvey::new(robots.clone(), names.channels());
+    survey.set_one_map(OneMap::read(&files, &names, robots));
     let mut renamed = Vec::new();
     let mut times: Option<(LogTime, LogTime)> = None;
     while let Some(message) = reader.next_message() {
@@ -218,33 +222,6 @@ fn look(inputs: &[Input], rules: &NameRules, robots: &RobotTopics, large: u64) -
     info.problems.extend(clocks);
     info.robots = survey.into_robots();
     Ok(info)
-}
-
-/// Whether logs contain tag readings and no map or scans of any robot, so that only frames can be merged. Only the
-/// channels are read.
-///
-/// # Errors
-/// A log cannot be read, or the rules do not match the logs.
-pub fn holds_tags_alone(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result<bool, NameError> {
-    let (_, names) = names::open(inputs, rules, robots)?;
-    let channels = RobotChannels::new(robots.clone(), names.channels());
-    let roles: Vec<Role> = names.channels().map(|channel| channels.classify(channel).role).collect();
-    let holds_tags = roles.iter().any(|role| matches!(role, Role::Tags | Role::TagMessage));
-    Ok(holds_tags && !roles.contains(&Role::Map) && !roles.contains(&Role::Scan))
-}
-
-/// The robots with scans and without maps, by name; maps can be built from their scans. Only the channels are read.
-///
-/// # Errors
-/// A log cannot be read, or the rules do not match the logs.
-pub fn robots_with_scans_only(
-    inputs: &[Input],
-    rules: &NameRules,
-    robots: &RobotTopics,
-) -> Result<Vec<String>, NameError> {
-    let (_, names) = names::open(inputs, rules, robots)?;
-    let channels = RobotChannels::new(robots.clone(), names.channels());
-    Ok(channels.scanned().map(str::to_owned).collect())
 }
 
 fn add_late_damage(reader: &mut LogReader, info: &mut LogInfo) {

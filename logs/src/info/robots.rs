@@ -2,6 +2,7 @@
 
 use super::LogInfo;
 use crate::names::{rename_advice, scan_rename_advice};
+use crate::one_map::OneMap;
 use crate::robots::{
     Classified, InferredPoses, MapOrigin, MergedMaps, PoseSource, RobotChannels, Role, TagReader, is_scan,
     pose_with_covariance,
@@ -65,6 +66,8 @@ pub(super) struct RobotSurvey {
     map_frames: BTreeMap<String, (String, String)>,
     /// Topics of merged maps of other programs.
     merged_topics: BTreeSet<String>,
+    /// The robots that localise in one map.
+    one_map: Option<OneMap>,
     robots: BTreeMap<String, RobotInfo>,
     tf: Option<TfPoses>,
     inferred: InferredPoses,
@@ -94,9 +97,15 @@ impl RobotSurvey {
             merged_maps: MergedMaps::default(),
             map_frames: BTreeMap::new(),
             merged_topics: BTreeSet::new(),
+            one_map: None,
             robots: BTreeMap::new(),
             unreadable: BTreeMap::new(),
         }
+    }
+
+    /// Sets the robots that localise in one map.
+    pub(super) fn set_one_map(&mut self, one_map: Option<OneMap>) {
+        self.one_map = one_map;
     }
 
     /// The role of a channel, and its robot.
@@ -282,7 +291,11 @@ impl RobotSurvey {
         let advice = rename_advice(other_maps().chain(fitting.iter().map(String::as_str)), pattern);
         let topics: Vec<&str> = other_maps().collect();
         let topics = topics.join(", ");
+        let in_one_map = |robot: &str| self.one_map.as_ref().is_some_and(|one_map| one_map.robots.contains(robot));
+        let one_map = self.one_map.iter();
+        problems.extend(one_map.map(|one_map| one_map.note().unwrap_or_else(|| one_map.reason(pattern))));
         match (advice.as_slice(), topics.as_str()) {
+            ([], _) if self.one_map.is_some() => {}
             ([], "") if has_no_map => {
                 problems.push(format!("no map was recognised: no topic fits `{pattern}`; there is no occupancy grid at all"));
             }
@@ -309,7 +322,12 @@ impl RobotSurvey {
         missing_poses.retain(|robot, _| robots.contains_key(robot));
         let lacking = |kind: &str, what: fn(&RobotInfo) -> u64| {
             let lacks = |(name, robot): &(&String, &RobotInfo)| {
-                what(robot) == 0 && !(kind == "pose" && missing_poses.contains_key(name.as_str()))
+                let is_reported = match kind {
+                    "map" => in_one_map(name),
+                    "pose" => missing_poses.contains_key(name.as_str()),
+                    _ => false,
+                };
+                what(robot) == 0 && !is_reported
             };
             let names = robots.iter().filter(lacks).map(|(name, _)| name.as_str());
             names.collect::<Vec<_>>().join(", ")

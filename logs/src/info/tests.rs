@@ -220,3 +220,30 @@ fn scans_on_topics_of_another_name_are_advised_to_be_renamed() {
     let problems = inspect_bytes(&log.finish()).problems.join("\n");
     assert!(problems.contains("give --rename '/{robot}/front/scan=/{robot}/scan'"), "{problems}");
 }
+
+#[test]
+fn robots_that_localise_in_one_map_are_named_with_it() {
+    use gridweave_runtime::ros::{Header, PoseWithCovarianceStamped};
+    let problems = |robots: [(&str, &str); 2], fill: &dyn Fn(&mut TestLog)| {
+        let mut log = TestLog::new(layouts()[3].clone());
+        let header = |frame: &str| Header::new(LogTime(1), frame);
+        log.add("/map", OccupancyGrid::NAME, 1, &OccupancyGrid { header: header("map"), ..Default::default() });
+        for (robot, frame) in robots {
+            let pose = PoseWithCovarianceStamped { header: header(frame), ..Default::default() };
+            log.add(&format!("/{robot}/amcl_pose"), PoseWithCovarianceStamped::NAME, 1, &pose);
+        }
+        fill(&mut log);
+        inspect_bytes(&log.finish()).problems.join("\n")
+    };
+    let localised = "robot1 and robot2 localise in one map, `/map`, in frame `map`";
+    let both = [("robot1", "map"), ("robot2", "/map")];
+    let text = problems(both, &|_| ());
+    assert!(text.contains(&format!("{localised}: there is nothing to merge")), "{text}");
+    assert!(!text.contains("no map was recognised"), "{text}");
+    let text = problems([("robot1", "map"), ("robot2", "robot2/map")], &|_| ());
+    assert!(!text.contains("localise in one map") && text.contains("no map was recognised"), "{text}");
+    let text = problems(both, &|log| {
+        log.raw("/robot1/scan", "sensor_msgs/msg/LaserScan", 1, b"");
+    });
+    assert!(text.contains(&format!("{localised}, and have one frame without a merge")), "{text}");
+}

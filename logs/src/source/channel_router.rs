@@ -5,6 +5,7 @@ use super::derived::Derived;
 use super::latched::Latch;
 use super::{RobotMessages, RobotReading};
 use crate::names::{rename_advice, scan_rename_advice};
+use crate::one_map::OneMap;
 use crate::robots::{CellValues, MapOrigin, MergedMaps, RobotChannels, Role, is_scan, tilt_of};
 use crate::schemas::full_type_name;
 use crate::tf::{MAP_FRAMES, is_static, tf_topic};
@@ -31,6 +32,8 @@ pub(super) struct ChannelRouter {
     derived: Derived,
     /// The frames of the robots' maps that are known before the first message.
     map_frames: BTreeSet<String>,
+    /// Whether robots localise in one map, which is no robot's.
+    has_one_map: bool,
 }
 
 impl ChannelRouter {
@@ -55,6 +58,7 @@ impl ChannelRouter {
             routes: Vec::new(),
             by_channel: BTreeMap::new(),
             map_frames: BTreeSet::new(),
+            has_one_map: false,
         }
     }
 
@@ -122,6 +126,12 @@ impl ChannelRouter {
         if let Some(route) = self.routes.get(index) {
             self.derived.learn(route, &self.roles, data, output);
         }
+    }
+
+    /// Learns that robots localise in one map. Returns the reason why nothing of them is merged.
+    pub(super) fn learn_one_map(&mut self, one_map: &OneMap) -> String {
+        self.has_one_map = true;
+        one_map.reason(&self.robots.map)
     }
 
     /// Whether anything is derived with frames of tf or of maps.
@@ -315,7 +325,7 @@ impl ChannelRouter {
             self.routes.iter().any(|route| role(route.role) && route.messages > route.unreadable)
         };
         let builds_maps = output.scans.is_read() && routed(|role| role == Role::Scan);
-        if output.map.is_read() && !builds_maps && !routed(|role| role == Role::Map) {
+        if output.map.is_read() && !builds_maps && !self.has_one_map && !routed(|role| role == Role::Map) {
             let others = match self.grid_topics().collect::<Vec<_>>().join(", ") {
                 topics if topics.is_empty() => topics,
                 topics => format!(" (there are maps on {topics})"),
@@ -338,6 +348,7 @@ impl ChannelRouter {
             output.warn(format!("scans on topics that do not fit `{pattern}` are not used: give {advice}"));
         }
         if output.pose.is_read()
+            && !self.has_one_map
             && !routed(|role| matches!(role, Role::Pose(_)))
             && !self.derived.has_inferred_poses()
             && !self.derived.has_odometry()

@@ -24,6 +24,7 @@ use crate::map_file::Thresholds;
 use crate::names::{Convention, Input, NameRules};
 use gridweave_runtime::ros::{
     OccupancyGrid, PoseWithCovarianceStamped, RangeScan, TagBearing, TagPosition, TagRange, TopologicalMap,
+    UnmergedRobot,
 };
 use gridweave_runtime::stage::{AnyMessage, Out, OutputPorts, Outputs, ParameterError, Parameters, StageKind};
 use schemars::JsonSchema;
@@ -138,6 +139,7 @@ pub struct RobotMessages {
     pub(crate) scans: Out<RangeScan>,
     pub(crate) odometry: Out<PoseWithCovarianceStamped>,
     pub(crate) other: Out<AnyMessage>,
+    pub(crate) localised: Out<UnmergedRobot>,
 }
 
 impl RobotMessages {
@@ -174,6 +176,11 @@ impl Outputs for RobotMessages {
             ),
             other: ports
                 .any_output("other", "all other messages, and those from which poses were derived, as logged or sent"),
+            localised: ports.output_on(
+                "/{robot}/localised",
+                "localised",
+                "from a log: robots that have nothing to be merged, as they localise in one map, which is no robot's",
+            ),
         }
     }
 }

@@ -6,9 +6,11 @@ use super::latched::{Latch, LatchedMessage, LatchedMessages};
 use super::preview::learn_ahead;
 use super::{RobotMessages, RobotReading};
 use crate::names::{Names, Renamed};
+use crate::one_map::OneMap;
 use crate::reader::{Damage, LogFile, LogMessage};
 use crate::reader::{SupplementKind, describes_its_file, read_attachment, read_metadata};
 use crate::robots::Role;
+use gridweave_runtime::ros::UnmergedRobot;
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -32,6 +34,8 @@ pub(crate) struct Router {
     /// By file and channel number: the target of the messages, once known.
     by_number: Vec<Vec<Option<Target>>>,
     has_sent_supplements: bool,
+    /// The robots that localise in one map; `None` once they are sent.
+    one_map: Option<OneMap>,
 }
 
 impl Router {
@@ -44,6 +48,7 @@ impl Router {
         updates_maps: bool,
         reading: RobotReading,
     ) -> Self {
+        let one_map = updates_maps.then(|| OneMap::read(&files, &names, &robots)).flatten();
         let mut channels = ChannelRouter::new(robots, names.channels(), updates_maps, reading);
         if updates_maps {
             learn_ahead(&files, &names, &mut channels);
@@ -55,6 +60,7 @@ impl Router {
             by_number: vec![Vec::new(); files.len()],
             files,
             has_sent_supplements: false,
+            one_map,
         }
     }
 
@@ -102,6 +108,16 @@ impl Router {
             }
         }
         Ok(())
+    }
+
+    /// Sends the robots that localise in one map, once.
+    pub(crate) fn send_localised(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
+        let Some(one_map) = self.one_map.take() else { return Ok(()) };
+        let reason = self.channels.learn_one_map(&one_map);
+        one_map.note().into_iter().for_each(|note| output.warn(note));
+        one_map.idle.iter().try_for_each(|robot| {
+            output.localised.send(robot, &UnmergedRobot { robot: robot.clone(), reason: reason.clone() })
+        })
     }
 
     fn send_supplement(

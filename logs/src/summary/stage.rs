@@ -1,11 +1,12 @@
 //! The stage `summary_sink`.
 
 use super::{Areas, DeformationSummary, Summary};
-use crate::file::replace;
-use gridweave_runtime::ros::{MapAgreement, MapDeformation, RobotFrames, Verdicts};
+use crate::file::replace_or_leave;
+use gridweave_runtime::ros::{MapAgreement, MapDeformation, RobotFrames, UnmergedRobot, Verdicts};
 use gridweave_runtime::stage::{Context, Output, Parameters, Received, StageError, StageKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// The parameters of `summary_sink`.
@@ -14,6 +15,9 @@ use std::path::PathBuf;
 struct SummaryParameters {
     /// The JSON file to write. An existing file is replaced.
     file: PathBuf,
+    /// Whether the file is left as `FILE.part` when it is whole: the command renames the files of all stages together.
+    /// Set by the command.
+    leave_part: bool,
 }
 
 impl Parameters for SummaryParameters {}
@@ -29,6 +33,11 @@ pub fn kind() -> StageKind {
     .optional_inputs("verdicts", "the outcome of each pair of robots", SummarySink::verdicts)
     .optional_inputs("agreement", "the agreement of the fused maps", SummarySink::agreement)
     .optional_inputs("deformation", "the deformations of the maps", SummarySink::deformation)
+    .optional_inputs(
+        "localised",
+        "robots that have nothing to be merged, as they localise in one map; listed even if no robot has a map frame",
+        SummarySink::localised,
+    )
     .finish(SummarySink::write)
     .build()
 }
@@ -36,19 +45,22 @@ pub fn kind() -> StageKind {
 /// Stores the latest message of each input.
 struct SummarySink {
     file: PathBuf,
+    leave_part: bool,
     /// The stage at the other end of each wire.
     from: Vec<String>,
     summary: Summary,
+    /// Why robots have nothing to be merged.
+    localised: BTreeMap<String, String>,
 }
 
 impl SummarySink {
-    fn new(SummaryParameters { file }: SummaryParameters, context: &Context) -> Result<Self, StageError> {
+    fn new(SummaryParameters { file, leave_part }: SummaryParameters, context: &Context) -> Result<Self, StageError> {
         if file.as_os_str().is_empty() {
             let doing = "write the summary";
             return Err(StageError::new(doing, "it has no file").with_help("give --summary FILE or file = \"FILE\""));
         }
         let from = context.inputs.iter().map(|wire| wire.from.clone()).collect();
-        Ok(Self { file, from, summary: Summary::default() })
+        Ok(Self { file, leave_part, from, summary: Summary::default(), localised: BTreeMap::new() })
     }
 
     fn frames(&mut self, frames: Received<'_, RobotFrames>, _: &Output<()>) -> Result<(), StageError> {
@@ -75,11 +87,22 @@ impl SummarySink {
         Ok(())
     }
 
+    fn localised(&mut self, localised: Received<'_, UnmergedRobot>, _: &Output<()>) -> Result<(), StageError> {
+        let UnmergedRobot { robot, reason } = localised.into_content();
+        self.localised.insert(robot, reason);
+        Ok(())
+    }
+
     fn write(&mut self, _: &Output<()>) -> Result<(), StageError> {
+        for (robot, reason) in std::mem::take(&mut self.localised) {
+            if !self.summary.frames.contains_key(&robot) {
+                self.summary.unmerged.entry(robot).or_insert(reason);
+            }
+        }
         let failed = |cause: &dyn std::fmt::Display| {
             StageError::new(format!("write the summary {}", self.file.display()), cause)
         };
         let text = serde_json::to_string_pretty(&self.summary).map_err(|error| failed(&error))? + "\n";
-        replace(&[(&self.file, text.as_bytes())]).map_err(|error| failed(&error))
+        replace_or_leave(&[(&self.file, text.as_bytes())], self.leave_part).map_err(|error| failed(&error))
     }
 }

@@ -61,7 +61,7 @@ pub(crate) fn write_log(log: &Path, truth: &Path, mut overrides: Overrides, regi
     let parameters = toml::Table::from_iter([("file".to_owned(), toml::Value::from(file))]);
     pipeline.attach(&truth::kind(), parameters, "truth", |_, _, _| true);
     check_outputs(&pipeline, None, &RunOptions::default())?;
-    let outputs = Outputs::of(&mut pipeline);
+    let outputs = Outputs::of(&mut pipeline, None);
     let progress = Progress::new(Mode::Replay);
     let report = engine::run(&pipeline, EngineKind::Threads, &progress);
     progress.finish();

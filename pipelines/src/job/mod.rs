@@ -118,7 +118,7 @@ impl Job<'_> {
         provenance::record(&mut pipeline);
         let sinks = ResultSinks::attach(&mut pipeline, self.options)?;
         attach(&mut pipeline)?;
-        let outputs = Outputs::of(&mut pipeline);
+        let outputs = Outputs::of(&mut pipeline, sinks.file());
         if let Some(address) = &self.options.view {
             let address = view::attach(&mut pipeline, self.registry, address)?;
             eprint_line(format_args!(

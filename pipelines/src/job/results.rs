@@ -2,6 +2,7 @@
 //! messages by their types, whatever stages send them.
 
 use super::options::RunOptions;
+use crate::merge_text::short;
 use crate::status::BadUse;
 use crate::summary::RunSummary;
 use anyhow::{Context, Result, bail};
@@ -17,6 +18,8 @@ use std::path::{Path, PathBuf};
 const MERGED: &str = "/map";
 /// The topic of a robot's map in the merged frame.
 const PLACED: &str = "/{robot}/merged_map";
+/// The port of robots that localise in one map, and have nothing to be merged.
+const LOCALISED: &str = "localised";
 /// The process that the sinks share where stages have processes.
 const PROCESS: &str = "results";
 
@@ -37,7 +40,10 @@ impl ResultSinks {
     pub(super) fn attach(pipeline: &mut Pipeline, options: &RunOptions) -> Result<Self> {
         let folder = PrivateFolder::create().context("cannot make a folder for the summary")?;
         let file = folder.path().join("summary.json");
-        let is_attached = attach(pipeline, &summary::kind(), &file, |_, _, _| true)?;
+        // A robot whose map could not be built is known to the frame solver; robots in one map may be all there is.
+        let is_attached = attach(pipeline, &summary::kind(), &file, |input, _, output| {
+            input.name != LOCALISED || output.name == LOCALISED
+        })?;
         let mut files = 0;
         if let Some(picture) = &options.picture {
             picture::check_format(picture).map_err(|error| BadUse(error.to_string()))?;
@@ -63,6 +69,11 @@ impl ResultSinks {
         Ok(Self { summary: is_attached.then_some(file), files, _folder: folder })
     }
 
+    /// The file of the summary, which [`summary`](Self::summary) reads.
+    pub(super) fn file(&self) -> Option<&Path> {
+        self.summary.as_deref()
+    }
+
     /// Reads the summary; `None` if the pipeline merges nothing.
     pub(super) fn summary(&self) -> Result<Option<Summary>> {
         let Some(file) = &self.summary else { return Ok(None) };
@@ -76,7 +87,9 @@ impl ResultSinks {
         if counts.sum::<u64>() < self.files {
             // No stage says of itself that it has sent nothing; why is in what was warned of.
             let warnings = summary.warnings().map(|(_, what, _)| format!("\n  {what}")).collect::<String>();
-            bail!("there is no merged map to write or to draw: nothing was sent on {MERGED}{warnings}");
+            let unmerged = summary.merge.iter().flat_map(|merge| &merge.unmerged);
+            let reasons = unmerged.map(|(robot, reason)| format!("\n  {robot}: {}", short(reason))).collect::<String>();
+            bail!("there is no merged map to write or to draw: nothing was sent on {MERGED}{reasons}{warnings}");
         }
         Ok(())
     }

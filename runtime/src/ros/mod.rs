@@ -36,7 +36,7 @@ pub use nav::{GridError, GridPrefix, MapMetaData, OccupancyGrid, Odometry, Path}
 pub use sensor::{LaserEcho, LaserScan, MultiEchoLaserScan, PointCloud2, PointField};
 pub use std_msgs::{Header, Time};
 pub use tags::{CommonTag, CommonTags, TagBearing, TagEstimate, TagEstimates, TagPosition, TagRange};
-pub use topological::{TopologicalMap, TopologicalNode, TopologicalPath};
+pub use topological::{TopologicalMap, TopologicalNode, TopologicalPath, TopologyError};
 pub use truth::{CommonPlace, SimulationTruth, TrueFrame, TrueTag};
 pub use visualization::{ColorRGBA, CompressedImage, Duration, Marker, MarkerArray, MeshFile, UVCoordinate};
 

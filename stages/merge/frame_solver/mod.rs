@@ -21,6 +21,7 @@ mod consensus;
 pub mod consistency;
 mod cut;
 pub mod graph;
+mod known_maps;
 mod messages;
 pub mod optimize;
 mod parameters;

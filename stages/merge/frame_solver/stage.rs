@@ -1,6 +1,7 @@
 //! The frame solver as a stage.
 
 use super::FrameSolverParameters;
+use super::known_maps::KnownMaps;
 use super::messages::{hold, is_same, prefixed, robot_frames, verdicts};
 use super::reasons;
 use super::solution::{Alignments, Solution, by_name};
@@ -8,7 +9,7 @@ use super::solve::solve;
 use super::tree::Tree;
 use crate::shared::robot_pair::RobotPair;
 use gridweave_runtime::ros::{
-    Alignment, GridError, Header, OccupancyGrid, RobotFrames, TFMessage, TagEstimates, UnmergedRobot, Verdict, Verdicts,
+    Alignment, Header, OccupancyGrid, RobotFrames, TFMessage, TagEstimates, UnmergedRobot, Verdict, Verdicts,
 };
 use gridweave_runtime::stage::{
     Context, InitialPoses, Out, Output, OutputPorts, Outputs, Received, StageError, StageKind,
@@ -41,7 +42,7 @@ pub fn kind() -> StageKind {
         "positions of tags in the robots' frames, for the names of the frames of robots without maps",
         FrameSolver::receive_tags,
     )
-    .optional_input("lost", "robots that have no map, with the reason", FrameSolver::receive_lost)
+    .optional_inputs("lost", "robots that have no map, with the reason", FrameSolver::receive_lost)
     .input("alignment", "alignments of pairs, accepted and refused ones", FrameSolver::receive_alignment)
     .finish(FrameSolver::finish)
     .build()
@@ -89,12 +90,7 @@ struct FrameSolver {
     initial_poses: InitialPoses,
     /// All known robots, and the names of their map frames in the merged tree of frames.
     robots: BTreeSet<String>,
-    /// The robots that have sent a map that can be used.
-    mapped: BTreeSet<String>,
-    /// What is wrong with the maps of robots that have sent none that can be used.
-    unusable_maps: BTreeMap<String, GridError>,
-    /// Why robots have no map.
-    lost: BTreeMap<String, String>,
+    maps: KnownMaps,
     frame_ids: BTreeMap<String, String>,
     alignments: Alignments,
     reference: Option<String>,
@@ -115,9 +111,8 @@ impl FrameSolver {
             wanted: context.reference.clone(),
             initial_poses: context.initial_poses.clone(),
             robots: BTreeSet::new(),
-            mapped: BTreeSet::new(),
-            unusable_maps: BTreeMap::new(),
-            lost: BTreeMap::new(),
+            // Where the tags give the frames of robots, robots need no maps.
+            maps: KnownMaps::new(context.is_wired("map") && !context.is_wired("tags")),
             frame_ids: BTreeMap::new(),
             alignments: BTreeMap::new(),
             reference: None,
@@ -145,22 +140,14 @@ impl FrameSolver {
         let is_new = self.robots.insert(robot.to_owned());
         let is_renamed = self.frame_ids.get(robot) != Some(&frame_id);
         self.frame_ids.insert(robot.to_owned(), frame_id);
-        let has_changed = match map.check() {
-            Ok(()) => {
-                self.mapped.insert(robot.to_owned());
-                self.unusable_maps.remove(robot).is_some()
-            }
-            Err(error) if !self.mapped.contains(robot) => self.unusable_maps.insert(robot.to_owned(), error).is_none(),
-            Err(_) => false,
-        };
+        let has_changed = self.maps.receive(robot, map.check());
         if is_new || is_renamed || has_changed { self.solve_and_send(output) } else { Ok(()) }
     }
 
     /// A robot without a map is in the frame of its tags, which is that of its poses.
     fn receive_tags(&mut self, tags: Received<'_, TagEstimates>, output: &Output<Placement>) -> Result<(), StageError> {
         let TagEstimates { robot, header, .. } = tags.into_content();
-        let has_map = self.mapped.contains(&robot) || self.unusable_maps.contains_key(&robot);
-        if has_map || header.frame_id.is_empty() {
+        if self.maps.has_sent(&robot) || header.frame_id.is_empty() {
             return Ok(());
         }
         let frame_id = prefixed(&robot, &header.frame_id);
@@ -176,8 +163,7 @@ impl FrameSolver {
         output: &Output<Placement>,
     ) -> Result<(), StageError> {
         let UnmergedRobot { robot, reason } = lost.into_content();
-        let before = self.lost.insert(robot, reason.clone());
-        if before == Some(reason) { Ok(()) } else { self.solve_and_send(output) }
+        if self.maps.lose(robot, reason) { self.solve_and_send(output) } else { Ok(()) }
     }
 
     /// An alignment changes the solution if it differs from the last one of its pair.
@@ -211,32 +197,8 @@ impl FrameSolver {
             return self.solve_and_send(output);
         }
         let reasons = reasons::of_pair(pair, &self.robots, &self.solution, &self.alignments);
-        let reasons = self.with_maps(reasons);
-        self.solution.unmerged.extend(reasons);
+        self.solution.unmerged.extend(self.maps.explain(reasons, &self.alignments));
         self.send_all(output)
-    }
-
-    /// Reasons why robots are not merged, as alignments give them, with what is known of their maps: where a map cannot
-    /// be used, that is the reason; where others have maps and a robot has none, it has only tags.
-    fn with_maps(&self, mut reasons: BTreeMap<String, String>) -> BTreeMap<String, String> {
-        for (robot, reason) in &mut reasons {
-            if let Some(error) = self.unusable_maps.get(robot) {
-                *reason = format!("its map cannot be used: {error}");
-            } else if self.is_by_tags_alone(robot) {
-                *reason = format!("it has sent no map, and by its tags alone: {reason}");
-            }
-        }
-        reasons
-    }
-
-    /// Whether a robot has sent no map where others have, and is aligned with none.
-    fn is_by_tags_alone(&self, robot: &str) -> bool {
-        let is_of_robot = |alignment: &Alignment| alignment.a == robot || alignment.b == robot;
-        // There are as many alignments as pairs, so they are looked at last.
-        !self.mapped.is_empty()
-            && !self.mapped.contains(robot)
-            && !self.lost.contains_key(robot)
-            && !self.alignments.values().any(|alignment| alignment.accepted && is_of_robot(alignment))
     }
 
     fn finish(&mut self, output: &Output<Placement>) -> Result<(), StageError> {
@@ -258,6 +220,10 @@ impl FrameSolver {
                 robots.join(", ")
             ));
         }
+        if self.maps.end() {
+            let reasons = std::mem::take(&mut self.solution.unmerged);
+            self.solution.unmerged = self.maps.explain(reasons, &self.alignments);
+        }
         self.send(output, true)?;
         self.send_verdicts(output)
     }
@@ -265,22 +231,22 @@ impl FrameSolver {
     fn solve_and_send(&mut self, output: &Output<Placement>) -> Result<(), StageError> {
         // Once robots are placed in its frame, the reference stays, even if a robot with an earlier name appears.
         let is_settled = self.solution.frames.len() > 1;
+        let robots = self.maps.without_lost(&self.robots, &self.alignments);
         self.reference = match &self.wanted {
-            Some(wanted) => self.robots.get(wanted).cloned(),
+            Some(wanted) => robots.get(wanted).cloned(),
             None if is_settled || self.is_settled => self.reference.take(),
             None => {
-                let mut with_maps = self.robots.iter().filter(|robot| !self.unusable_maps.contains_key(*robot));
-                with_maps.next().or_else(|| self.robots.first()).cloned()
+                let mut with_maps = robots.iter().filter(|robot| !self.maps.is_unusable(robot));
+                with_maps.next().or_else(|| robots.first()).cloned()
             }
         };
         self.is_settled |= is_settled;
         if let Some(reference) = &self.reference {
+            self.solution = solve(&robots, &self.alignments, reference, &self.parameters, &self.solution);
             // A robot that had a map before it lost its way keeps its place.
-            let lost = self.lost.iter().filter(|(robot, _)| !self.robots.contains(*robot));
-            self.solution = solve(&self.robots, &self.alignments, reference, &self.parameters, &self.solution);
-            self.solution.unmerged.extend(lost.map(|(robot, reason)| (robot.clone(), reason.clone())));
+            self.solution.unmerged.extend(self.maps.lost().filter(|(robot, _)| !robots.contains(robot)));
             let reasons = std::mem::take(&mut self.solution.unmerged);
-            self.solution.unmerged = self.with_maps(reasons);
+            self.solution.unmerged = self.maps.explain(reasons, &self.alignments);
         }
         self.send_all(output)
     }
@@ -343,7 +309,8 @@ impl FrameSolver {
         if self.reference.is_none() || !output.verdicts.is_read() {
             return Ok(());
         }
-        let verdicts = verdicts(&self.solution, &self.alignments);
+        let mut verdicts = verdicts(&self.solution, &self.alignments);
+        self.maps.explain_pairs(&mut verdicts);
         if verdicts != self.sent_verdicts {
             let header = Header::new(output.log_time(), RobotFrames::WORLD);
             let message = Verdicts { header, verdicts };

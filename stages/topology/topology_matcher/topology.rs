@@ -1,7 +1,7 @@
 //! A topological map as points.
 
 use crate::shared::geometry::Point2;
-use gridweave_runtime::ros::TopologicalMap;
+use gridweave_runtime::ros::{TopologicalMap, TopologyError};
 use std::collections::BTreeSet;
 
 /// The nodes of a topological map and the straight paths between them.
@@ -13,41 +13,16 @@ pub struct Topology {
     pub paths: Vec<[usize; 2]>,
 }
 
-/// Why a message cannot be used as a topological map.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum TopologyError {
-    /// A position is not finite.
-    #[error("the position of node {0} is not finite")]
-    Position(usize),
-    /// A path to a node that does not exist.
-    #[error("path {path} has node {node}, but there are only {nodes}, counted from 0")]
-    NoSuchNode {
-        /// Index of the path.
-        path: usize,
-        /// The node of the path.
-        node: u32,
-        /// Number of nodes.
-        nodes: usize,
-    },
-}
-
 impl Topology {
     /// The nodes and paths of a message.
     ///
     /// # Errors
-    /// A position is not finite, or a path has a node that does not exist.
+    /// A value is out of range, or a path has a node that does not exist.
     pub fn from_message(map: &TopologicalMap) -> Result<Self, TopologyError> {
-        let nodes: Vec<Point2> = map.nodes.iter().map(|node| Point2::new(node.x, node.y)).collect();
-        if let Some(node) = nodes.iter().position(|node| !(node.x.is_finite() && node.y.is_finite())) {
-            return Err(TopologyError::Position(node));
-        }
-        let mut paths = Vec::with_capacity(map.paths.len());
-        for (path, ends) in map.paths.iter().map(|path| [path.start, path.end]).enumerate() {
-            if let Some(&node) = ends.iter().find(|node| **node as usize >= nodes.len()) {
-                return Err(TopologyError::NoSuchNode { path, node, nodes: nodes.len() });
-            }
-            paths.push(ends.map(|node| node as usize));
-        }
+        map.check()?;
+        let nodes = map.nodes.iter().map(|node| Point2::new(node.x, node.y)).collect();
+        let ends = map.paths.iter().map(|path| [path.start, path.end].map(|node| node as usize));
+        let mut paths: Vec<[usize; 2]> = ends.collect();
         let mut known = BTreeSet::new();
         paths.retain(|&[start, end]| known.insert([start.min(end), start.max(end)]));
         Ok(Self { nodes, paths })

@@ -1,6 +1,6 @@
 //! Reading a topological map from a JSON file.
 
-use gridweave_runtime::ros::{Point, TopologicalMap, TopologicalNode, TopologicalPath};
+use gridweave_runtime::ros::{Point, TopologicalMap, TopologicalNode, TopologicalPath, TopologyError};
 use serde::Deserialize;
 use std::fs::File;
 use std::io::{self, BufReader};
@@ -36,6 +36,14 @@ pub enum TopologyFileError {
         node: u32,
         /// The number of nodes.
         nodes: usize,
+    },
+    /// A value is out of range.
+    #[error("{path} cannot be used: {error}", path = path.display())]
+    OutOfRange {
+        /// The file.
+        path: PathBuf,
+        /// Which.
+        error: TopologyError,
     },
 }
 
@@ -78,7 +86,8 @@ fn certain() -> f64 {
 /// Reads a topological map. Its header and robot are left empty, since files contain neither.
 ///
 /// # Errors
-/// The file cannot be read, is not valid JSON of this form, or has a path to a node that does not exist.
+/// The file cannot be read, is not valid JSON of this form, or has a path to a node that does not exist or a value that
+/// is out of range.
 pub fn load(path: &Path) -> Result<TopologicalMap, TopologyFileError> {
     let unreadable = |error| TopologyFileError::Unreadable { path: path.to_owned(), error };
     let file = File::open(path).map_err(unreadable)?;
@@ -96,7 +105,9 @@ pub fn load(path: &Path) -> Result<TopologicalMap, TopologyFileError> {
     }
     let node =
         |node: JsonNode| TopologicalNode { x: node.x, y: node.y, kind: node.kind, probability: node.probability };
-    Ok(TopologicalMap { nodes: map.nodes.into_iter().map(node).collect(), paths, ..Default::default() })
+    let map = TopologicalMap { nodes: map.nodes.into_iter().map(node).collect(), paths, ..Default::default() };
+    map.check().map_err(|error| TopologyFileError::OutOfRange { path: path.to_owned(), error })?;
+    Ok(map)
 }
 
 impl JsonPath {

@@ -37,7 +37,8 @@ impl Source for TopologyFileSource {
         let Some((robot, file)) = self.maps.get(self.sent) else { return Ok(false) };
         self.sent += 1;
         output.set_log_time(LogTime(self.sent as u64 * INTERVAL));
-        let mut map = load(file).map_err(|error| StageError::new("read a topological map", error))?;
+        let mut map =
+            load(file).map_err(|error| StageError::new(format!("read the topological map of {robot}"), error))?;
         map.header = Header::new(output.log_time(), format!("{robot}/map"));
         map.robot.clone_from(robot);
         output.0.send(robot, &map)?;

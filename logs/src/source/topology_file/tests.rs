@@ -39,9 +39,12 @@ fn invalid_topological_maps_are_reported_with_their_file() {
         (r#"{"nodes": [], "paths": [], "edges": []}"#, "unknown field `edges`"),
         (r#"{"nodes": [{"x": 0, "y": 0}], "paths": [{"start": 0, "end": 1}]}"#, "path 0 of"),
         (r#"{"nodes": [{"x": 1e999, "y": 0}], "paths": []}"#, "number out of range"),
+        (r#"{"nodes": [{"x": 1e300, "y": 0}], "paths": []}"#, "the position of node 0"),
+        (r#"{"nodes": [{"x": 0, "y": 0, "probability": 7}], "paths": []}"#, "the probability of node 0"),
+        (r#"{"nodes": [{"x": 0, "y": 0}], "paths": [{"start": 0, "end": 0, "length": -3}]}"#, "the length of path 0"),
     ] {
         let error = run(&[("a.json", text)]).unwrap_err().to_string();
-        assert!(error.contains(expected) && error.contains("a.json"), "{error}");
+        assert!(error.contains(expected) && error.contains("a.json") && error.contains("map of a"), "{error}");
     }
     assert!(run(&[]).unwrap_err().to_string().contains("no input file"));
     assert!(load("/nowhere/a.json".as_ref()).unwrap_err().to_string().contains("cannot read /nowhere/a.json"));

@@ -200,6 +200,46 @@ fn a_robot_that_has_lost_its_way_is_not_merged_and_is_no_reference() {
 }
 
 #[test]
+fn robots_of_which_it_is_known_why_they_have_no_map_are_no_reference_and_no_pair() {
+    let mut run = Run::new(None);
+    run.align(&refused("robot1", "robot2", 0.0, "no tag in common"));
+    run.lost("robot1", "nothing to merge");
+    run.lost("robot2", "nothing to merge");
+    run.align(&refused("robot2", "robot3", 0.0, "no tag in common"));
+    run.map("robot3", "map");
+    run.map("robot4", "map");
+    run.align(&between(3, 4));
+    assert_eq!(run.solved().reference, "robot3");
+    assert_eq!([run.reason("robot1"), run.reason("robot2")], ["nothing to merge"; 2].map(str::to_owned));
+    let verdicts: Vec<Verdicts> = run.stage.take("verdicts").unwrap();
+    let last = &verdicts.last().unwrap().verdicts;
+    let pairs: Vec<_> = last.iter().map(|verdict| (&*verdict.alignment.a, &*verdict.alignment.b)).collect();
+    assert_eq!(pairs, [("robot2", "robot3"), ("robot3", "robot4")]);
+    // An alignment by tags merges a robot all the same.
+    run.align(&between(2, 3));
+    assert!(run.pose_of("robot2").is_some());
+}
+
+#[test]
+fn where_maps_are_expected_and_there_are_none_the_reasons_say_so() {
+    let wire = |port| InputWire { port, ..Default::default() };
+    let reasons = |inputs: Vec<InputWire>| {
+        let mut run = Run::in_context(&Context { inputs, ..Default::default() });
+        run.align(&refused("robot1", "robot2", 0.0, "no tag in common"));
+        assert_eq!(run.reason("robot2"), "no alignment with robot1: no tag in common", "maps may come");
+        run.finish().unwrap();
+        let reason = run.reason("robot2");
+        let verdicts: Vec<Verdicts> = run.stage.take("verdicts").unwrap();
+        (reason, verdicts.last().unwrap().verdicts[0].alignment.reason.clone())
+    };
+    let (robot, pair) = reasons(vec![wire("map")]);
+    assert_eq!(robot, "it has sent no map, and by its tags alone: no alignment with robot1: no tag in common");
+    assert_eq!(pair, "robot1 and robot2 have sent no map, and by tags alone: no tag in common");
+    let (robot, pair) = reasons(vec![wire("map"), wire("tags")]);
+    assert_eq!((&*robot, &*pair), ("no alignment with robot1: no tag in common", "no tag in common"));
+}
+
+#[test]
 fn the_most_informative_refusal_is_the_reason() {
     let mut run = Run::new(None);
     run.align(&between(1, 2));

@@ -11,7 +11,7 @@ use gridweave_runtime::ros::{
     Alignment, Header, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames, TFMessage, TagEstimates, UnmergedRobot,
     Verdict, Verdicts,
 };
-use gridweave_runtime::stage::{Context, InitialPose, StageError, StageHarness};
+use gridweave_runtime::stage::{Context, InitialPose, InputWire, StageError, StageHarness};
 
 struct Run {
     stage: StageHarness,
