@@ -139,7 +139,7 @@ fn robots_with_scans_and_odometry_alone_are_merged() {
     ended.assert(0, &["merged 2 of 2"]);
     assert!(!ended.text().contains("tf has no transform"), "{}", ended.text());
     assert_eq!(judged(folder), [1, 0].map(Value::from));
-    for wrong in ["0,0", "0,0,nan", "0,0,0,0,0", "ahead"] {
+    for wrong in ["0,0", "0,0,nan", "0,0,0,0,0", "ahead", "0,0,90"] {
         lidar(wrong).assert(2, &["--lidar robot1=", "write ROBOT=X,Y,YAW"]);
     }
     gridweave(folder, &["merge", "scans.mcap", "-o", "out.mcap", "--lidar", "robot9=0,0,0"])

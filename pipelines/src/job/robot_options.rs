@@ -3,6 +3,7 @@
 use super::Job;
 use super::inputs::Inputs;
 use crate::status::BadUse;
+use gridweave_runtime::stage::InitialPose;
 use toml::{Table, Value};
 
 /// The hypotheses that the user accepts, a parameter of the verifier.
@@ -31,10 +32,12 @@ pub(super) fn lidars(job: &Job<'_>) -> Result<Table, BadUse> {
     if !job.inputs.is_empty() && job.kind != Inputs::Logs {
         return Err(BadUse("--lidar is for logs with scans, and the inputs are others".to_owned()));
     }
-    read(job, "lidar", &job.options.lidar, "ROBOT=X,Y,YAW or ROBOT=X,Y,YAW,ROLL in metres and radians", |pose| {
+    let form = "ROBOT=X,Y,YAW or ROBOT=X,Y,YAW,ROLL in metres and radians (90 degrees are 1.5708)";
+    read(job, "lidar", &job.options.lidar, form, |pose| {
         let number = |text: &str| text.trim().parse().ok().filter(|value: &f64| value.is_finite()).map(Value::Float);
         let numbers: Vec<Value> = pose.split(',').map(number).collect::<Option<_>>()?;
-        matches!(numbers.len(), 3 | 4).then_some(Value::Array(numbers))
+        let is_angle = |value: &Value| value.as_float().is_some_and(|value| value.abs() <= InitialPose::FULL_TURN);
+        (matches!(numbers.len(), 3 | 4) && numbers[2..].iter().all(is_angle)).then_some(Value::Array(numbers))
     })
 }
 

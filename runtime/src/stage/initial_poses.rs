@@ -29,6 +29,8 @@ impl Default for InitialPose {
 impl InitialPose {
     /// The origin of all initial poses, exactly.
     pub const ORIGIN: Self = Self { x: 0.0, y: 0.0, yaw: 0.0, stddev: 0.0, yaw_stddev: 0.0 };
+    /// The greatest yaw, radians: a full turn, rounded up. Who means degrees is told.
+    pub const FULL_TURN: f64 = 6.2832;
     /// Its keys in a pipeline file, and its order on a command line.
     pub const FIELDS: [&str; 5] = ["x", "y", "yaw", "stddev", "yaw_stddev"];
 
@@ -40,7 +42,11 @@ impl InitialPose {
         let (place, expected, is_fit) = match field {
             0 => (&mut self.x, "a finite number of metres", value.is_finite()),
             1 => (&mut self.y, "a finite number of metres", value.is_finite()),
-            2 => (&mut self.yaw, "a finite number of radians", value.is_finite()),
+            2 => (
+                &mut self.yaw,
+                "radians from -6.2832 to 6.2832 (90 degrees are 1.5708)",
+                value.abs() <= Self::FULL_TURN,
+            ),
             3 => (&mut self.stddev, "metres from 0.01 to 10000", (0.01..=1e4).contains(&value)),
             _ => (&mut self.yaw_stddev, "radians from 0.001 to 10", (1e-3..=10.0).contains(&value)),
         };

@@ -299,7 +299,8 @@ fn an_initial_pose_has_a_position_and_a_yaw() {
     };
     errors("{ x = 1.0, y = 2 }", "11:11", "{ x = 1.0, y = 2 }", &["`initial` has no `yaw`", "in metres and radians"]);
     errors("{ x = 1.0, y = 2, yaw = 0, std = 1 }", "11:38", "std", &["unknown key `std`", "did you mean"]);
-    errors("{ x = 1.0, y = 2, yaw = \"east\" }", "11:35", "\"east\"", &["a finite number of radians"]);
+    errors("{ x = 1.0, y = 2, yaw = \"east\" }", "11:35", "\"east\"", &["radians from -6.2832 to 6.2832"]);
+    errors("{ x = 1.0, y = 2, yaw = 90 }", "11:35", "90", &["90 degrees are 1.5708"]);
     errors("{ x = 1.0, y = nan, yaw = 0 }", "11:26", "nan", &["a finite number of metres"]);
     errors("{ x = 1.0, y = 2, yaw = 0, stddev = 0.0 }", "11:47", "0.0", &["metres from 0.01"]);
     let robot = "[robots.robot2]\ninital = { }\n\n[stages.log]";
