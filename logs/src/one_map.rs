@@ -5,7 +5,7 @@
 
 use crate::names::Names;
 use crate::reader::{ChannelPart, LogFile, LogReader};
-use crate::robots::{RobotChannels, Role, fits};
+use crate::robots::{RobotChannels, Role, fits, is_scan};
 use crate::schemas::full_type_name;
 use crate::tf::tf_topic;
 use gridweave_runtime::message::Channel;
@@ -90,7 +90,7 @@ impl OneMap {
                     read += 1;
                     let transforms = decode::<TFMessage>(message.data).map(|message| message.transforms);
                     for edge in transforms.unwrap_or_default() {
-                        if let Some(robot) = robot_of_frame(robot, plain(&edge.child_frame_id)) {
+                        if let Some(robot) = robot_of_frame(robot, plain(&edge.child_frame_id), names) {
                             posed.entry(robot).or_default().insert(plain(&edge.header.frame_id).to_owned());
                         }
                     }
@@ -109,13 +109,12 @@ impl OneMap {
         roles: &RobotChannels,
         names: &Names,
     ) -> Option<Self> {
-        let has_grid = |robot: &str| {
-            let is_own = |channel: &Channel| {
-                let rest = channel.topic.strip_prefix('/').and_then(|topic| topic.strip_prefix(robot));
-                is_grid(channel) && rest.is_some_and(|rest| rest.starts_with('/') && !rest.contains("costmap"))
-            };
-            names.channels().any(is_own)
+        // Also where its name is elsewhere in the topic: such a map or scan is used once it is renamed.
+        let has = |robot: &str, is_meant: fn(&Channel) -> bool| {
+            let is_own = |channel: &Channel| channel.topic.contains(robot) && !channel.topic.contains("costmap");
+            names.channels().any(|channel| is_meant(channel) && channel.topic != topic && is_own(channel))
         };
+        let has_grid = |robot: &str| has(robot, is_grid);
         let in_map = posed.iter().filter(|(robot, frames)| frames.contains(&frame) && fits(robot) && !has_grid(robot));
         let robots: BTreeSet<String> = in_map.map(|(robot, _)| robot.clone()).collect();
         let mut busy: BTreeSet<&str> = roles.tags_in_tf().iter().map(String::as_str).chain(roles.scanned()).collect();
@@ -125,7 +124,9 @@ impl OneMap {
                 busy.insert(classified.robot);
             }
         }
-        let idle = robots.iter().filter(|robot| !busy.contains(robot.as_str())).cloned().collect();
+        let has_scans = |robot: &str| has(robot, |channel| is_scan(&full_type_name(&channel.schema_name)));
+        let is_idle = |robot: &&String| !busy.contains(robot.as_str()) && !has_scans(robot);
+        let idle = robots.iter().filter(is_idle).cloned().collect();
         (robots.len() >= LEAST_ROBOTS).then_some(Self { topic, frame, robots, idle })
     }
 
@@ -167,8 +168,13 @@ fn plain(frame: &str) -> &str {
 }
 
 /// The robot of a frame by which a localizer connects it to a map: `robot1/odom`, or `odom` on the transforms of
-/// `robot1`.
-fn robot_of_frame(robot: &str, frame: &str) -> Option<String> {
+/// `robot1`; or `robot1_odom` of a robot that has a topic, since there may be several kinds of odometry.
+fn robot_of_frame(robot: &str, frame: &str, names: &Names) -> Option<String> {
     let (named, last) = frame.rsplit_once('/').unwrap_or((robot, frame));
-    (ROBOT_FRAMES.contains(&last) && !named.is_empty()).then(|| named.to_owned())
+    if ROBOT_FRAMES.contains(&last) {
+        return Some(named.to_owned()).filter(|named| !named.is_empty());
+    }
+    let named = ROBOT_FRAMES.iter().find_map(|name| frame.strip_suffix(name)?.strip_suffix('_'))?;
+    let under = format!("/{named}/");
+    names.channels().any(|channel| channel.topic.starts_with(&under)).then(|| named.to_owned())
 }

@@ -49,10 +49,15 @@ impl TestLog {
 
     /// Adds a chunk without messages.
     pub(crate) fn empty_chunk(&mut self) -> &mut Self {
-        self.flush();
-        let schema = self.writer.add_schema("p/msg/Silent", "ros2msg", b"").unwrap();
-        self.writer.add_channel(schema, "/silent", "cdr", &BTreeMap::new()).unwrap();
-        self.flush()
+        self.flush().silent("/silent", "p/msg/Silent").flush()
+    }
+
+    /// Adds a channel without messages.
+    pub(crate) fn silent(&mut self, topic: &str, type_name: &str) -> &mut Self {
+        let text = schema_text(type_name).unwrap_or_default();
+        let schema = self.writer.add_schema(type_name, "ros2msg", text.as_bytes()).unwrap();
+        self.writer.add_channel(schema, topic, "cdr", &BTreeMap::new()).unwrap();
+        self
     }
 
     /// Adds a ROS message.

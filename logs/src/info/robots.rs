@@ -297,7 +297,18 @@ impl RobotSurvey {
         match (advice.as_slice(), topics.as_str()) {
             ([], _) if self.one_map.is_some() => {}
             ([], "") if has_no_map => {
-                problems.push(format!("no map was recognised: no topic fits `{pattern}`; there is no occupancy grid at all"));
+                let scans: Vec<&str> = self.other_scans.iter().map(String::as_str).collect();
+                let scans = match scans.is_empty() {
+                    true => String::new(),
+                    false => format!(
+                        "; `merge` builds maps from the scans on {} if the robot is named (`gridweave merge ROBOT=LOG \
+                         OTHER_ROBOT=OTHER_LOG`)",
+                        scans.join(", ")
+                    ),
+                };
+                problems.push(format!(
+                    "no map was recognised: no topic fits `{pattern}`; there is no occupancy grid at all{scans}"
+                ));
             }
             ([], topics) if has_no_map => problems.push(format!(
                 "no map was recognised: no topic fits `{pattern}`; there are occupancy grids on {topics}: if the log is of one \

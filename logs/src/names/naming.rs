@@ -101,7 +101,8 @@ pub(super) fn name(
     Ok(Names { channels, robots: robot_of_file, note })
 }
 
-/// The channels of all files, with the user's renames applied.
+/// The channels of all files, with the user's renames applied. Where robots are looked for, channels without messages
+/// are left out: one with maps would stand for a map, and hide the scans of its robot.
 fn drafts(files: &[LogFile], rules: &NameRules) -> Vec<Draft> {
     let draft = |file: usize, number: u16, channel: Channel| {
         let renamed = rules.renamed(&channel.topic);
@@ -111,7 +112,9 @@ fn drafts(files: &[LogFile], rules: &NameRules) -> Vec<Draft> {
         Draft { file, number, channel: Channel { topic, ..channel }, logged, is_renamed, robot: None }
     };
     let of_file = |(file, log): (usize, &LogFile)| {
-        log.channels().map(|(number, channel)| draft(file, number, channel)).collect::<Vec<_>>()
+        let is_silent = |number: u16| rules.convention == Convention::ByRobot && log.is_silent(number);
+        let channels = log.channels().filter(|(number, _)| !is_silent(*number));
+        channels.map(|(number, channel)| draft(file, number, channel)).collect::<Vec<_>>()
     };
     files.iter().enumerate().flat_map(of_file).collect()
 }

@@ -114,7 +114,8 @@ impl Definitions {
             if !channel.topic.starts_with('/') {
                 channel.topic.insert(0, '/');
             }
-            let is_latching = matches!(channel.metadata.remove(ros1::LATCHING).as_deref(), Some("1" | "true"));
+            let latching = channel.metadata.remove(ros1::LATCHING).unwrap_or_default();
+            let is_latching = latching == "1" || latching.eq_ignore_ascii_case("true");
             let offered = if is_latching { qos::LATCHED } else { "" };
             channel.metadata.insert(qos::KEY.to_owned(), offered.to_owned());
         }

@@ -147,6 +147,14 @@ impl LogFile {
         (counted.into_iter().all(is_complete) && self.statistics()?.messages == messages).then_some(&self.layout.index)
     }
 
+    /// Whether an index says that a channel has no messages, in a file that has some.
+    pub(crate) fn is_silent(&self, channel: u16) -> bool {
+        let has_none = |index: &BTreeMap<u16, IndexedChannel>| {
+            !index.is_empty() && index.get(&channel).is_none_or(|indexed| indexed.messages == 0)
+        };
+        self.index().is_some_and(has_none)
+    }
+
     /// The names of the file's metadata records.
     pub fn metadata_names(&self) -> impl Iterator<Item = &str> {
         self.layout.metadata.keys().map(String::as_str)

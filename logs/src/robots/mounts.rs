@@ -32,6 +32,11 @@ impl Mounts {
         self.tree.insert(parent, child, transform, is_static);
     }
 
+    /// Whether a frame is a base frame of a robot.
+    pub(crate) fn is_base(&self, robot: &str, frame: &str) -> bool {
+        self.bases.iter().any(|base| base.replace("{robot}", robot) == frame)
+    }
+
     /// The robot's base frame, and the pose of the sensor frame `frame` in it.
     pub(crate) fn mount(&self, robot: &str, frame: &str) -> Result<(String, Isometry3<f64>), NoTransform> {
         let connected = |base: &String| {

@@ -82,8 +82,10 @@ impl Scans {
                 })
             }
             Scan::Cloud(cloud) => {
-                let is_base = base == lidar && self.mounts.mount(robot, &lidar).is_ok();
-                let slice = Slice::of(&cloud, &transform_base_lidar.rotation, is_base)?;
+                if is_fixed(&lidar) {
+                    return Err(CloudFault::Fixed(lidar));
+                }
+                let slice = Slice::of(&cloud, &transform_base_lidar.rotation, self.mounts.is_base(robot, &lidar))?;
                 let first = LogTime::from(cloud.header.stamp).plus_seconds(slice.begin);
                 Ok(RangeScan {
                     header: Header::new(first, base),
@@ -100,6 +102,13 @@ impl Scans {
             }
         }
     }
+}
+
+/// Whether a frame is one that does not move with its robot, by the usual names. Points that were transformed there do
+/// not show where the lidar was.
+fn is_fixed(frame: &str) -> bool {
+    let name = frame.rsplit(['/', '_']).next().unwrap_or(frame);
+    ["odom", "map", "world"].contains(&name)
 }
 
 /// A scan in the frame of its lidar.
@@ -245,6 +254,14 @@ mod tests {
         };
         assert_eq!(measured("r1/laser"), (0.2, 0.5, 300.0));
         assert_eq!(measured("r1/base_link"), (0.0, 0.0, 400.0));
+        // Above every base frame is the same.
+        assert_eq!(measured("r1/base_footprint"), (0.0, 0.0, 400.0));
+        for fixed in ["r1/odom", "r1/map", "r1_odom"] {
+            assert_eq!(scans.to_base_frame("r1", cloud(fixed)), Err(CloudFault::Fixed(fixed.to_owned())));
+        }
+        let set = Scans::new(None, LidarPoses::from([("r1".to_owned(), vec![0.1, -0.2, 0.0])]));
+        let found = set.to_base_frame("r1", cloud("r1/laser")).unwrap();
+        assert!(found.x == 0.1 && found.ranges.iter().any(|range| (range - 3.0).abs() < 0.01));
         // A frame that tf does not know is that of the lidar.
         assert_eq!(measured("r1/velodyne"), (0.0, 0.0, 300.0));
     }

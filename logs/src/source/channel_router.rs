@@ -341,7 +341,9 @@ impl ChannelRouter {
             ));
         }
         if output.map.is_read()
-            && !routed(|role| matches!(role, Role::Map | Role::Scan))
+            && !routed(|role| role == Role::Map)
+            // Of scans that cannot be read, that is said.
+            && !self.routes.iter().any(|route| route.role == Role::Scan)
             && let Some(advice) = scan_rename_advice(self.topics_of(is_scan), &self.robots.scan)
         {
             let pattern = &self.robots.scan;

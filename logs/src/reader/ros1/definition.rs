@@ -8,8 +8,8 @@ const SEPARATOR: &str = "=======================================================
 pub(super) fn type_name(name: &str) -> String {
     match name.split_once('/') {
         Some(("tf", "tfMessage")) => "tf2_msgs/msg/TFMessage".to_owned(),
-        Some((package, message)) => format!("{package}/msg/{message}"),
-        None => name.to_owned(),
+        Some((package, message)) if !message.contains('/') => format!("{package}/msg/{message}"),
+        _ => name.to_owned(),
     }
 }
 

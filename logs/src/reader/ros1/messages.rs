@@ -15,8 +15,11 @@ pub(crate) struct Converted {
 }
 
 impl Converted {
-    /// Converts a type by its name and its definition. `None` if the definition cannot be used.
+    /// Converts a type by its name and its definition. `None` if the definition cannot be used, or is missing.
     pub(crate) fn of(name: &str, definition: &str) -> Option<Self> {
+        if definition.is_empty() && name != "std_msgs/Empty" {
+            return None;
+        }
         let (type_name, definition) = (type_name(name), translate(definition));
         let recoder = Schema::parse(&type_name, &definition).ok().and_then(Recoder::new)?;
         Some(Self { type_name, definition, recoder })

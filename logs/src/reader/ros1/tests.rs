@@ -165,7 +165,7 @@ fn messages_are_read_by_time_and_converted_to_ros_2() {
 #[test]
 fn ros_1_messages_in_mcap_are_converted_too() {
     let folder = Folder::new();
-    for (options, latching) in layouts().into_iter().zip(["true", "1", "", "false"]) {
+    for (options, latching) in layouts().into_iter().zip(["True", "1", "", "false"]) {
         let mut log = mcap::Writer::with_options(Cursor::new(Vec::new()), options.profile("ros1")).unwrap();
         let schema = log.add_schema("geometry_msgs/PoseStamped", "ros1msg", POSE.as_bytes()).unwrap();
         let unusable = log.add_schema("a/B", "ros1msg", b"C c").unwrap();
@@ -191,7 +191,7 @@ fn ros_1_messages_in_mcap_are_converted_too() {
             (channels[0].schema_name.as_str(), channels[0].message_encoding.as_str()),
             (PoseStamped::NAME, "cdr")
         );
-        assert_eq!(crate::qos::is_transient_local(&channels[0].metadata), ["true", "1"].contains(&latching));
+        assert_eq!(crate::qos::is_transient_local(&channels[0].metadata), ["True", "1"].contains(&latching));
         assert_eq!(channels[1].message_encoding, "ros1");
     }
 }
@@ -199,6 +199,7 @@ fn ros_1_messages_in_mcap_are_converted_too() {
 #[test]
 fn definitions_have_the_names_of_ros_2() {
     assert_eq!(type_name("nav_msgs/OccupancyGrid"), "nav_msgs/msg/OccupancyGrid");
+    assert_eq!(type_name("nav_msgs/msg/OccupancyGrid"), "nav_msgs/msg/OccupancyGrid");
     assert_eq!(type_name("tf/tfMessage"), "tf2_msgs/msg/TFMessage");
     let text = translate(
         "time[] at\nduration d\nbyte b\nchar c\nint32 A=1 # time\nHeader header\nstd_msgs/Header h\nfloat32[3] x",

@@ -16,6 +16,8 @@ pub(crate) enum CloudFault {
     Field(&'static str),
     /// The data are shorter than the rows that the cloud states.
     Short,
+    /// The points are in this frame, which does not move with the robot.
+    Fixed(String),
 }
 
 impl fmt::Display for CloudFault {
@@ -23,6 +25,11 @@ impl fmt::Display for CloudFault {
         match self {
             Self::Field(name) => write!(f, "its points have no field `{name}` that is one floating-point number"),
             Self::Short => write!(f, "its data are shorter than its rows"),
+            Self::Fixed(frame) => write!(
+                f,
+                "its points are in `{frame}`, which does not move with the robot; give a topic with the points as the \
+                 lidar measured them"
+            ),
         }
     }
 }

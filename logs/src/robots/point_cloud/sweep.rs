@@ -25,7 +25,8 @@ impl Sweep {
     /// Finds the turn from times (seconds) and directions (radians), by the straight line of least squares through
     /// them. `None` if they are not those of a lidar that turns evenly.
     pub(super) fn of(mut measured: Vec<(f64, f64)>) -> Option<Self> {
-        if measured.len() < LEAST_DIRECTIONS || !measured.iter().all(|(time, _)| time.is_finite()) {
+        measured.retain(|(time, _)| time.is_finite());
+        if measured.len() < LEAST_DIRECTIONS {
             return None;
         }
         measured.sort_by(|one, other| one.0.total_cmp(&other.0));
@@ -64,7 +65,8 @@ mod tests {
     #[test]
     fn a_turn_is_found_in_either_direction() {
         for (first, rate) in [(0.5, 60.0), (-3.0, -62.8), (3.1, 125.0)] {
-            let found = Sweep::of(turn(first, rate)).unwrap();
+            let unknown = [(f64::NAN, 0.1), (f64::INFINITY, 2.0)];
+            let found = Sweep::of(turn(first, rate).into_iter().chain(unknown).collect()).unwrap();
             assert_eq!(found.begin, 7.0 + 2e-4);
             assert!((found.first - first - rate * 2e-4).abs() < 1e-6, "{found:?}");
             assert!((found.rate - rate).abs() < 1e-6, "{found:?}");

@@ -1,7 +1,7 @@
 //! Point clouds of 3D lidars.
 
 use super::*;
-use gridweave_runtime::ros::{PointCloud2, PointField};
+use gridweave_runtime::ros::{LaserScan, PointCloud2, PointField};
 
 /// A cloud of one point ahead of the lidar, and one on the floor below it.
 fn cloud<'a>(frame: &str, data: &'a [u8], point_step: u32) -> PointCloud2<'a> {
@@ -69,5 +69,22 @@ fn a_cloud_that_cannot_be_read_is_a_warning_with_its_reason() {
         "a point cloud on `/robot2/points` could not be read: its data are shorter than its rows",
     ] {
         assert_eq!(run.warnings.get(warning), Some(&1), "{:?}", run.warnings);
+    }
+}
+
+#[test]
+fn a_topic_of_maps_or_scans_without_messages_hides_no_cloud() {
+    // Only chunks have an index.
+    for options in layouts().into_iter().skip(1) {
+        let data = points();
+        let folder = Folder::new();
+        let mut log = TestLog::new(options);
+        log.silent("/robot1/scan", LaserScan::NAME)
+            .silent("/robot2/map", OccupancyGrid::NAME)
+            .add("/robot1/points", PointCloud2::NAME, 1, &cloud("robot1/lidar", &data, 12))
+            .add("/robot2/points", PointCloud2::NAME, 2, &cloud("robot2/lidar", &data, 12));
+        let files = vec![folder.write("a.mcap", &log.finish())];
+        let run = try_run(files, "", RobotTopics::default()).unwrap();
+        assert_eq!(run.on("scans").len(), 2);
     }
 }
