@@ -36,7 +36,10 @@ pub fn rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -
         return Vec::new();
     }
     let mut advice = Vec::new();
-    for topic in single {
+    // Beside the maps of two robots that name them, one that names none is a map that they share.
+    let (named, nameless): (Vec<&str>, Vec<&str>) = single.into_iter().partition(|topic| *topic != "/map");
+    let is_shared = robots.len() + named.len() > 1;
+    for topic in named.into_iter().chain(nameless.into_iter().filter(|_| !is_shared)) {
         let Some(robot) = robot_of_part(topic, &robots) else { continue };
         let renamed = pattern.replace(ROBOT, &robot);
         // What the option takes is the only thing that is advised.
@@ -139,6 +142,9 @@ mod tests {
         assert_eq!(advice(&["/a_map", "/b_map"]), renamed(&[("/a_map", "a"), ("/b_map", "b")]));
         assert_eq!(advice(&["/map", "/robot2/map"]), renamed(&[("/map", "robot1")]));
         assert_eq!(advice(&["/map", "/robot1/map"]), renamed(&[("/map", "robot2")]));
+        // A map that two robots share is not one of theirs.
+        let named = [("/a_map", "a"), ("/b_map", "b")];
+        assert_eq!(advice(&["/map", "/a_map", "/b_map"]), renamed(&named));
     }
 
     #[test]
