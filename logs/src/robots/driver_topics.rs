@@ -18,7 +18,6 @@ impl DriverTopics {
             }
             let robot = |name: &str| match_robot(&format!("/{{robot}}/{name}"), topic);
             let found = names.iter().enumerate().find_map(|(rank, name)| Some((rank, robot(name)?)));
-            let found = found.filter(|(_, robot)| !is_sensor(robot));
             if let Some((rank, robot)) = found {
                 let best = ranked.entry(robot).or_insert((rank, topic));
                 *best = (*best).min((rank, topic));
@@ -39,29 +38,6 @@ impl DriverTopics {
     }
 }
 
-/// Whether the first part of a topic is the name of a sensor: that of a robot which is alone in its log.
-fn is_sensor(name: &str) -> bool {
-    const SENSORS: [&str; 15] = [
-        "cam",
-        "depth",
-        "stereo",
-        "rgbd",
-        "realsense",
-        "kinect",
-        "zed",
-        "oak",
-        "sensor",
-        "lidar",
-        "laser",
-        "velodyne",
-        "ouster",
-        "livox",
-        "hesai",
-    ];
-    let name = name.to_lowercase();
-    SENSORS.iter().any(|sensor| name.starts_with(sensor) || name.ends_with(sensor))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -73,8 +49,8 @@ mod tests {
             ["/b/platform/odom", "/a/odom", "/a/platform/odom", "/platform/odom", "/odom", "/camera/odom", "odom", ""];
         let mut topics = DriverTopics::choose(&names, all.into_iter());
         let chosen = |topics: &DriverTopics| all.map(|topic| topics.robot(topic).unwrap_or_default().to_owned());
-        assert_eq!(chosen(&topics), ["b", "a", "", "", "", "", "", ""]);
+        assert_eq!(chosen(&topics), ["b", "a", "", "", "", "camera", "", ""]);
         topics.retain(|robot| robot != "a");
-        assert_eq!(chosen(&topics), ["b", "", "", "", "", "", "", ""]);
+        assert_eq!(chosen(&topics), ["b", "", "", "", "", "camera", "", ""]);
     }
 }

@@ -41,7 +41,7 @@ impl ScanTopics {
         let by_pattern: BTreeSet<&str> = channels.iter().filter_map(|channel| topics.robot(channel)).collect();
         let clouds = channels.iter().filter(|channel| full_type_name(&channel.schema_name) == PointCloud2::NAME);
         topics.clouds = DriverTopics::choose(&LIDAR_CLOUDS, clouds.map(|channel| channel.topic.as_str()));
-        topics.clouds.retain(|robot| !by_pattern.contains(robot));
+        topics.clouds.retain(|robot| !by_pattern.contains(robot) && !is_sensor(robot));
         topics
     }
 
@@ -52,6 +52,29 @@ impl ScanTopics {
         }
         match_robot(&self.pattern, &channel.topic).or_else(|| self.clouds.robot(&channel.topic))
     }
+}
+
+/// Whether a name is that of a sensor, as in `/front_camera/points`, and not of a robot.
+fn is_sensor(name: &str) -> bool {
+    const SENSORS: [&str; 16] = [
+        "cam",
+        "camera",
+        "depth",
+        "stereo",
+        "rgbd",
+        "realsense",
+        "kinect",
+        "zed",
+        "oak",
+        "sensor",
+        "lidar",
+        "laser",
+        "velodyne",
+        "ouster",
+        "livox",
+        "hesai",
+    ];
+    name.to_lowercase().split(|letter: char| !letter.is_alphabetic()).any(|word| SENSORS.contains(&word))
 }
 
 #[cfg(test)]
@@ -94,12 +117,16 @@ mod tests {
             ("/d/points", CLOUD),
             ("/e/points", LaserScan::NAME),
             ("/f/cloud_registered", CLOUD),
+            ("/front_camera2/points", CLOUD),
+            ("/Lidar/points", CLOUD),
+            ("/camel/points", CLOUD),
         ];
         let expected = [
             pair("a", "/a/scan"),
             pair("b", "/b/velodyne_points"),
             pair("c", "/c/ouster/points"),
             pair("d", "/d/scan"),
+            pair("camel", "/camel/points"),
         ];
         assert_eq!(chosen(&topics), expected);
     }
