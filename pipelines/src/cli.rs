@@ -8,9 +8,10 @@ use crate::interrupt;
 use crate::logging::LoggingArgs;
 use crate::status::Status;
 use anyhow::Result;
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 use gridweave_runtime::stage::Registry;
 use std::ffi::OsString;
+use std::path::Path;
 
 /// Merges the maps of several robots that explore one building, each in its own map frame.
 ///
@@ -108,18 +109,25 @@ impl Command {
 }
 
 impl Cli {
-    /// Runs the command, whose command line has these words, with the given stage kinds. `on_warning` is called for
-    /// each warning.
-    pub(crate) fn execute(self, words: &[OsString], registry: &Registry, on_warning: fn(&str, &str)) -> Result<Status> {
+    /// Runs the command, whose command line has these words, with the given stage kinds. `command` describes all
+    /// commands of the program. `on_warning` is called for each warning.
+    pub(crate) fn execute(
+        self,
+        words: &[OsString],
+        command: &clap::Command,
+        registry: &Registry,
+        on_warning: fn(&str, &str),
+    ) -> Result<Status> {
         let trace = self.logging.start(words, on_warning)?;
-        let done = self.run(registry);
+        let program = words.first().and_then(|word| Path::new(word).file_name()?.to_str());
+        let done = self.run(command, program.unwrap_or(command.get_name()), registry);
         if let Some(trace) = trace {
             trace.end(done.is_ok());
         }
         done
     }
 
-    fn run(self, registry: &Registry) -> Result<Status> {
+    fn run(self, command: &clap::Command, program: &str, registry: &Registry) -> Result<Status> {
         if self.command.must_end_in_order() {
             interrupt::hold_back();
         }
@@ -148,7 +156,7 @@ impl Cli {
             Command::View(args) => live::view(&args, registry),
             Command::Bridge(args) => live::bridge(&args, registry),
             Command::Clean => processes::clean(),
-            Command::Shell(args) => shell::shell(&args, &Self::command()),
+            Command::Shell(args) => shell::shell(&args, command, program),
             Command::Stage(args) => processes::stage(&args, registry),
             Command::Measure(args) => compare::measure::measure(&args),
         }

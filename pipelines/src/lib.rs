@@ -81,7 +81,7 @@ pub fn command_line(
         return 2;
     }
     let command = verbs.iter().fold(cli::Cli::command(), |command, verb| command.subcommand(verb.command()));
-    match execute(&command.get_matches_from(&arguments), &arguments, &registry, verbs, on_warning) {
+    match execute(&command, &arguments, &registry, verbs, on_warning) {
         Ok(Status::Done) => 0,
         Ok(Status::BadUse) => 2,
         Ok(Status::Failed) => 1,
@@ -102,17 +102,18 @@ pub fn is_bad_use(error: &anyhow::Error) -> bool {
 }
 
 fn execute(
-    matches: &clap::ArgMatches,
+    command: &clap::Command,
     words: &[OsString],
     registry: &Registry,
     verbs: &[Verb],
     on_warning: fn(&str, &str),
 ) -> anyhow::Result<Status> {
+    let matches = command.clone().get_matches_from(words);
     if let Some((name, of_verb)) = matches.subcommand()
         && let Some(verb) = verbs.iter().find(|verb| verb.name == name)
     {
         terminal::print(verb.execute(of_verb)?)?;
         return Ok(Status::Done);
     }
-    cli::Cli::from_arg_matches(matches)?.execute(words, registry, on_warning)
+    cli::Cli::from_arg_matches(&matches)?.execute(words, command, registry, on_warning)
 }

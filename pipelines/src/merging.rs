@@ -14,14 +14,14 @@
 //! ```
 
 use crate::commands::merge::MergeArgs;
-use crate::job::{Inputs, Job, Output, RunOptions, Watcher};
+use crate::job::{Inputs, Job, NamingOptions, Output, ReadingOptions, RunOptions, Watcher};
 use crate::shipped;
 use crate::status::BadUse;
 use crate::summary::RunSummary;
 use anyhow::Result;
 use gridweave_logs::map_file::GridMap;
 use gridweave_logs::source::map_file::kind_of_maps;
-use gridweave_runtime::engine::Observer;
+use gridweave_runtime::engine::{EngineKind, Observer};
 use gridweave_runtime::message::Message;
 use gridweave_runtime::pipeline::{Mode, Pipeline};
 use gridweave_runtime::ros::OccupancyGrid;
@@ -42,10 +42,18 @@ pub struct MergeRequest {
     pub initial: Vec<String>,
     /// Hypotheses to accept, as `ROBOT=N`.
     pub accept: Vec<String>,
+    /// Other names of topics of logs, as `OLD=NEW`; `{robot}` matches one part of both.
+    pub rename: Vec<String>,
+    /// Poses of lidars on their robots, as `ROBOT=X,Y,YAW[,ROLL]`.
+    pub lidar: Vec<String>,
+    /// Whether the thresholds of map files are applied literally, even where these leave no walls.
+    pub literal_thresholds: bool,
     /// Parameters of stages, as `STAGE.PARAMETER=VALUE`.
     pub set: Vec<String>,
     /// The seed of all random numbers.
     pub seed: Option<u64>,
+    /// The engine that runs the stages; the result is the same.
+    pub engine: Option<EngineKind>,
     /// The log to write; none if `None`.
     pub output: Option<PathBuf>,
 }
@@ -70,19 +78,20 @@ pub fn merge_files(files: &[PathBuf], request: &MergeRequest, observer: &dyn Obs
     }
     let args = MergeArgs { inputs: files.to_vec(), output: PathBuf::new(), options: request.options() };
     let pipeline = Path::new(args.pipeline()?);
-    request.run(pipeline, (files, Inputs::of(files)?), request.log_or(Output::MapOnly), [], observer)
+    request.run(pipeline, (files, Inputs::of(files)?), request.log_or(Output::MapOnly), Vec::new(), observer)
 }
 
 /// Runs a pipeline file, or the shipped pipeline of that name, on files, with the stage kinds of Gridweave and the
 /// given ones.
 ///
 /// # Errors
-/// The pipeline or the request is wrong, or a stage fails; or the observer stops the run.
+/// The pipeline or the request is wrong, the pipeline has no stage of a given kind, or a stage fails; or the observer
+/// stops the run.
 pub fn run_pipeline(
     pipeline: &Path,
     files: &[PathBuf],
     request: &MergeRequest,
-    kinds: impl IntoIterator<Item = StageKind>,
+    kinds: Vec<StageKind>,
     observer: &dyn Observer,
 ) -> Result<Merged> {
     request.run(pipeline, (files, Inputs::of_run(files)?), request.log_or(Output::OfPipeline), kinds, observer)
@@ -108,9 +117,12 @@ pub fn merge_maps(
     if maps.is_empty() {
         return Err(BadUse("there is nothing to merge: give at least one map".to_owned()).into());
     }
+    // As of map files, so that one initial pose says how its robot lies to that one.
+    let first = names.first().filter(|_| !request.initial.is_empty()).map(|first| (*first).clone());
+    let request = MergeRequest { reference: request.reference.clone().or(first), ..request.clone() };
     let pipeline = Path::new("map_file_merge");
     let none = (&[][..], Inputs::MapFiles);
-    request.run(pipeline, none, request.log_or(Output::MapOnly), [kind_of_maps(maps)], observer)
+    request.run(pipeline, none, request.log_or(Output::MapOnly), vec![kind_of_maps(maps)], observer)
 }
 
 impl MergeRequest {
@@ -119,8 +131,15 @@ impl MergeRequest {
             reference: self.reference.clone(),
             initial: self.initial.clone(),
             accept: self.accept.clone(),
+            lidar: self.lidar.clone(),
+            literal_thresholds: self.literal_thresholds,
             set: self.set.clone(),
             seed: self.seed,
+            engine: self.engine,
+            reading: ReadingOptions {
+                names: NamingOptions { rename: self.rename.clone(), ..NamingOptions::default() },
+                ..ReadingOptions::default()
+            },
             ..RunOptions::default()
         }
     }
@@ -135,13 +154,19 @@ impl MergeRequest {
         pipeline: &Path,
         (inputs, kind): (&[PathBuf], Inputs),
         output: Output<'_>,
-        kinds: impl IntoIterator<Item = StageKind>,
+        kinds: Vec<StageKind>,
         observer: &dyn Observer,
     ) -> Result<Merged> {
         let merged = Arc::new(Mutex::new(None));
         let map_sink = merged_map_kind(&merged);
+        let given: Vec<&str> = kinds.iter().map(|kind| kind.name).collect();
         let job = Job { pipeline, inputs, kind, output, options: &self.options(), registry: &shipped::registry(kinds) };
         let attach = |pipeline: &mut Pipeline| {
+            let is_unused = |name: &&&str| !pipeline.stages.iter().any(|stage| stage.kind.name == **name);
+            if let Some(unused) = given.iter().find(is_unused) {
+                let text = format!("the pipeline `{}` has no stage of the kind `{unused}`", pipeline.name);
+                return Err(BadUse(text).into());
+            }
             if pipeline.mode == Mode::Live {
                 // Its stages are processes, which cannot share what the program has.
                 let name = pipeline.name.as_str();
@@ -227,6 +252,24 @@ mod tests {
         });
         let of_files = merge_files(&files, &MergeRequest::default(), &()).unwrap();
         assert_eq!((of_files.summary.merge.unwrap(), of_files.map.unwrap()), (summary, map));
+    }
+
+    #[test]
+    fn one_initial_pose_is_in_the_frame_of_the_first_map() {
+        let maps = [("a", (0, 0)), ("b", (12, 7))].map(|(name, shift)| (name.to_owned(), Arc::new(room(shift))));
+        let request = MergeRequest { initial: vec!["b=-0.6,-0.35,0".to_owned()], ..MergeRequest::default() };
+        let summary = merge_maps(maps.to_vec(), &request, &()).unwrap().summary.merge.unwrap();
+        assert_eq!((summary.reference.as_deref(), summary.frames.len()), (Some("a"), 2));
+    }
+
+    #[test]
+    fn a_stage_that_the_pipeline_does_not_have_is_bad_use() {
+        let kind = StageKind::stage("thin", "Thins lines", |(), _: &Context| Ok(()));
+        let kind = kind.finish(|(): &mut (), _: &StageOutput<()>| Ok(())).build();
+        let pipeline = Path::new("map_file_merge");
+        let error = run_pipeline(pipeline, &["a.yaml".into()], &MergeRequest::default(), vec![kind], &()).unwrap_err();
+        assert!(crate::is_bad_use(&error), "{error:#}");
+        assert_eq!(error.to_string(), "the pipeline `map_file_merge` has no stage of the kind `thin`");
     }
 
     #[test]

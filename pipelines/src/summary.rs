@@ -105,7 +105,7 @@ impl RunSummary {
                 "the input has no usable map{}\n\
                  a nav_msgs/msg/OccupancyGrid is needed for each robot, by default on /ROBOT/map; `gridweave info LOG` lists the \
                  topics, and [robots] in the pipeline file names those that are read",
-                self.warnings().map(|(_, what, _)| format!("\n  {what}")).collect::<String>()
+                self.warning_texts()
             );
         }
         Ok(())
@@ -164,17 +164,32 @@ impl RunSummary {
 
     /// Formats the warnings, a line each.
     pub(crate) fn warning_lines(&self) -> impl Iterator<Item = String> {
-        self.warnings().map(|(stage, what, count)| {
+        self.distinct_warnings().into_iter().map(|(what, stages, count)| {
             let times = if count == 1 { "once".to_owned() } else { format!("{count} times") };
-            format!("warning: {stage}: {what} ({times})")
+            format!("warning: {}: {what} ({times})", stages.join(", "))
         })
     }
 
-    /// Iterates over all warnings: stage, text, count.
-    pub(crate) fn warnings(&self) -> impl Iterator<Item = (&str, &str, u64)> {
-        self.stages
-            .iter()
-            .flat_map(|stage| stage.warnings.iter().map(|(what, count)| (stage.name.as_str(), what.as_str(), *count)))
+    /// Formats the texts of the warnings, an indented line each, for behind another line.
+    pub(crate) fn warning_texts(&self) -> String {
+        self.distinct_warnings().iter().map(|(what, ..)| format!("\n  {what}")).collect()
+    }
+
+    /// Each text of a warning once, in the order in which they appear, with the stages that warn so and their greatest
+    /// count: several stages take the same map, and have the same to say of it.
+    fn distinct_warnings(&self) -> Vec<(&str, Vec<&str>, u64)> {
+        let mut distinct: Vec<(&str, Vec<&str>, u64)> = Vec::new();
+        let warnings = self.stages.iter().flat_map(|stage| stage.warnings.iter().map(move |warning| (stage, warning)));
+        for (StageSummary { name: stage, .. }, (what, count)) in warnings {
+            match distinct.iter_mut().find(|(known, ..)| *known == what) {
+                Some((_, stages, most)) => {
+                    stages.push(stage);
+                    *most = *count.max(most);
+                }
+                None => distinct.push((what, vec![stage], *count)),
+            }
+        }
+        distinct
     }
 }
 
@@ -187,4 +202,26 @@ fn write_areas(out: &mut String, stage: &str, area: &Areas, width: Option<usize>
         write!(line, ", which contradict each other on {in_conflict_m2:.1} m2 of it ({percent:.1} %)")?;
     }
     writeln!(out, "\n{}", wrap(&line, 2, width))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn a_warning_of_several_stages_is_one_line() {
+        let stage = |name: &str, warnings: &[(&str, u64)]| StageReport {
+            name: name.into(),
+            warnings: warnings.iter().map(|(what, count)| ((*what).to_owned(), *count)).collect(),
+            busy: Duration::ZERO,
+            ..StageReport::default()
+        };
+        let stages =
+            vec![stage("maps", &[("it is empty", 1)]), stage("fuser", &[("it is empty", 3), ("it is old", 1)])];
+        let summary = RunSummary::new(None, &RunReport { stages, ..RunReport::default() });
+        let lines: Vec<String> = summary.warning_lines().collect();
+        assert_eq!(lines, ["warning: maps, fuser: it is empty (3 times)", "warning: fuser: it is old (once)"]);
+        assert_eq!(summary.warning_texts(), "\n  it is empty\n  it is old");
+    }
 }

@@ -45,6 +45,9 @@ fn simulated_maps_are_merged_without_tags() {
     for part in ["the maps alone", "m of walls in common", "the maps confirm it"] {
         assert!(reason.contains(part), "{reason}");
     }
+    let agreement = |name: &str| alignment["evidence"][name].as_f64().unwrap();
+    assert!(agreement("wall_on_wall_m") > 10.0 * agreement("wall_on_free_m"), "{alignment}");
+    assert!(agreement("overlap_m2") > 20.0 && agreement("hypotheses") >= 1.0, "{alignment}");
 }
 
 #[test]

@@ -6,7 +6,8 @@ mod stage;
 pub use stage::kind;
 
 use gridweave_runtime::ros::{
-    self, DeformationNode, MapAgreement, MapDeformation, RobotFrame, RobotFrames, RobotGroup, Verdict, Verdicts,
+    self, DeformationNode, Evidence, MapAgreement, MapDeformation, RobotFrame, RobotFrames, RobotGroup, Verdict,
+    Verdicts,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -145,6 +146,37 @@ pub struct Pair {
     pub checked: bool,
     /// The reason why it is not used, or the evidence for it.
     pub reason: String,
+    /// The agreement of the maps; `None` if they were not compared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub evidence: Option<PairEvidence>,
+}
+
+/// The agreement of two maps at the alignment of the pair.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PairEvidence {
+    /// The number of hypotheses that were judged.
+    pub hypotheses: u32,
+    /// The area that is known in both maps, square metres.
+    pub overlap_m2: f64,
+    /// The inlier length: walls of one map on walls of the other, metres.
+    pub wall_on_wall_m: f64,
+    /// The conflict length: walls of one map on free space of the other, metres.
+    pub wall_on_free_m: f64,
+    /// The evidence for the second-best hypothesis, as a share of that for this one.
+    pub elsewhere: f64,
+}
+
+impl From<&Evidence> for PairEvidence {
+    fn from(message: &Evidence) -> Self {
+        let Evidence { hypotheses, overlap, wall_on_wall, wall_on_free, evidence_elsewhere, .. } = *message;
+        Self {
+            hypotheses,
+            overlap_m2: overlap,
+            wall_on_wall_m: wall_on_wall,
+            wall_on_free_m: wall_on_free,
+            elsewhere: evidence_elsewhere,
+        }
+    }
 }
 
 /// The agreement of the fused maps: areas in square metres.
@@ -192,6 +224,7 @@ impl Summary {
             accepted: alignment.accepted,
             checked: *checked,
             reason: alignment.reason.clone(),
+            evidence: None,
         };
         self.alignments = message.verdicts.iter().map(pair).collect();
     }

@@ -1,8 +1,8 @@
 //! The stage `summary_sink`.
 
-use super::{Areas, DeformationSummary, Summary};
+use super::{Areas, DeformationSummary, PairEvidence, Summary};
 use crate::file::replace_or_leave;
-use gridweave_runtime::ros::{MapAgreement, MapDeformation, RobotFrames, UnmergedRobot, Verdicts};
+use gridweave_runtime::ros::{Evidence, MapAgreement, MapDeformation, RobotFrames, UnmergedRobot, Verdicts};
 use gridweave_runtime::stage::{Context, Output, Parameters, Received, StageError, StageKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -31,6 +31,7 @@ pub fn kind() -> StageKind {
     )
     .inputs("frames", "the robots' map frames", SummarySink::frames)
     .optional_inputs("verdicts", "the outcome of each pair of robots", SummarySink::verdicts)
+    .optional_inputs("evidence", "the agreement of the maps of each pair", SummarySink::evidence)
     .optional_inputs("agreement", "the agreement of the fused maps", SummarySink::agreement)
     .optional_inputs("deformation", "the deformations of the maps", SummarySink::deformation)
     .optional_inputs(
@@ -49,6 +50,8 @@ struct SummarySink {
     /// The stage at the other end of each wire.
     from: Vec<String>,
     summary: Summary,
+    /// The agreement of the maps of each pair, robots a and b.
+    evidence: BTreeMap<(String, String), PairEvidence>,
     /// Why robots have nothing to be merged.
     localised: BTreeMap<String, String>,
 }
@@ -60,7 +63,8 @@ impl SummarySink {
             return Err(StageError::new(doing, "it has no file").with_help("give --summary FILE or file = \"FILE\""));
         }
         let from = context.inputs.iter().map(|wire| wire.from.clone()).collect();
-        Ok(Self { file, leave_part, from, summary: Summary::default(), localised: BTreeMap::new() })
+        let (summary, evidence, localised) = Default::default();
+        Ok(Self { file, leave_part, from, summary, evidence, localised })
     }
 
     fn frames(&mut self, frames: Received<'_, RobotFrames>, _: &Output<()>) -> Result<(), StageError> {
@@ -70,6 +74,13 @@ impl SummarySink {
 
     fn verdicts(&mut self, verdicts: Received<'_, Verdicts>, _: &Output<()>) -> Result<(), StageError> {
         self.summary.set_verdicts(&verdicts);
+        Ok(())
+    }
+
+    fn evidence(&mut self, evidence: Received<'_, Evidence>, _: &Output<()>) -> Result<(), StageError> {
+        let of_pair = PairEvidence::from(&*evidence);
+        let Evidence { a, b, .. } = evidence.into_content();
+        self.evidence.insert((a, b), of_pair);
         Ok(())
     }
 
@@ -98,6 +109,9 @@ impl SummarySink {
             if !self.summary.frames.contains_key(&robot) {
                 self.summary.unmerged.entry(robot).or_insert(reason);
             }
+        }
+        for pair in &mut self.summary.alignments {
+            pair.evidence = self.evidence.get(&(pair.a.clone(), pair.b.clone())).copied();
         }
         let failed = |cause: &dyn std::fmt::Display| {
             StageError::new(format!("write the summary {}", self.file.display()), cause)

@@ -51,6 +51,7 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::watched::keep_process();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

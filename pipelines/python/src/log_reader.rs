@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 /// The messages of logs in log time order: topic, type, encoding, definition, log time and publish time (nanoseconds),
 /// and bytes.
-#[pyclass(unsendable)]
+#[pyclass]
 pub(crate) struct LogMessages {
     reader: LogReader,
     names: Names,

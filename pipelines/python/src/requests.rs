@@ -3,8 +3,9 @@
 use crate::errors::exception;
 use crate::grid::{self, Grid};
 use crate::python_stage;
-use crate::watched::watched;
+use crate::watched::{is_forked, watched};
 use gridweave::merging::{self, MergeRequest, Merged};
+use gridweave_runtime::engine::EngineKind;
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -17,16 +18,22 @@ pub(crate) struct Request(MergeRequest);
 #[pymethods]
 impl Request {
     #[new]
-    #[pyo3(signature = (*, reference, initial, accept, settings, seed, output))]
+    #[pyo3(signature = (*, reference, initial, accept, rename, lidar, literal_thresholds, settings, seed, output))]
+    #[expect(clippy::too_many_arguments, reason = "each has its name in Python")]
     fn new(
         reference: Option<String>,
         initial: Vec<String>,
         accept: Vec<String>,
+        rename: Vec<String>,
+        lidar: Vec<String>,
+        literal_thresholds: bool,
         settings: Vec<String>,
         seed: Option<u64>,
         output: Option<PathBuf>,
     ) -> Self {
-        Self(MergeRequest { reference, initial, accept, set: settings, seed, output })
+        let engine = is_forked().then_some(EngineKind::Single);
+        let set = settings;
+        Self(MergeRequest { reference, initial, accept, rename, lidar, literal_thresholds, set, seed, engine, output })
     }
 }
 

@@ -1,15 +1,41 @@
 //! Long work that the user can watch and interrupt.
 
+use crate::errors::GridweaveError;
 use gridweave_runtime::engine::Observer;
 use gridweave_runtime::message::LogTime;
 use pyo3::prelude::*;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::thread;
 use std::time::Duration;
+use std::{process, thread};
 
 /// The interval at which signals are looked for, and progress is reported.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
+
+/// The process that has loaded the module.
+static LOADED_IN: OnceLock<u32> = OnceLock::new();
+
+/// Keeps the number of this process, which loads the module.
+pub(crate) fn keep_process() {
+    LOADED_IN.get_or_init(process::id);
+}
+
+/// Whether this is a child of the process that has loaded the module, made by `fork` as `multiprocessing` does. It has
+/// none of the other's threads: whoever waits for one waits for ever.
+pub(crate) fn is_forked() -> bool {
+    LOADED_IN.get().is_some_and(|loaded_in| *loaded_in != process::id())
+}
+
+/// Does work whose parallel loops use threads of this process.
+fn with_own_threads<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    if !is_forked() {
+        return Ok(work());
+    }
+    let pool = rayon::ThreadPoolBuilder::new().build();
+    let pool = pool.map_err(|error| GridweaveError::new_err(format!("cannot start threads: {error}")))?;
+    Ok(pool.install(work))
+}
 
 /// What a run and its caller share.
 #[derive(Default)]
@@ -44,7 +70,7 @@ pub(crate) fn watched<T: Send>(
         let worker = scope.spawn(move || {
             // Dropped when the work has ended, in whatever way.
             let _ended = ended;
-            work(watch)
+            with_own_threads(|| work(watch))
         });
         let mut raised = None;
         loop {
@@ -66,7 +92,7 @@ pub(crate) fn watched<T: Send>(
     });
     match (result, raised) {
         (_, Some(error)) => Err(error),
-        (Ok(result), None) => Ok(result),
+        (Ok(result), None) => result,
         (Err(panic), None) => std::panic::resume_unwind(panic),
     }
 }

@@ -86,7 +86,7 @@ impl ResultSinks {
         let counts = report.stages.iter().filter_map(|stage| stage.counts.get("files"));
         if counts.sum::<u64>() < self.files {
             // No stage says of itself that it has sent nothing; why is in what was warned of.
-            let warnings = summary.warnings().map(|(_, what, _)| format!("\n  {what}")).collect::<String>();
+            let warnings = summary.warning_texts();
             let unmerged = summary.merge.iter().flat_map(|merge| &merge.unmerged);
             let reasons = unmerged.map(|(robot, reason)| format!("\n  {robot}: {}", short(reason))).collect::<String>();
             bail!("there is no merged map to write or to draw: nothing was sent on {MERGED}{reasons}{warnings}");

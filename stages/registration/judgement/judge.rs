@@ -56,13 +56,14 @@ pub fn judge_again(
         }
         all.retain(is_possible);
     }
-    let all = merged(all);
-    let listed = Listed::of(&all);
+    let mut all = merged(all);
     let is_expected = known.window.is_some();
+    let candidates = deformed(all.clone(), a, b, &comparison, comparisons);
+    let log_odds: Vec<f64> = candidates.iter().map(|candidate| log_odds(candidate, is_expected)).collect();
+    sort_by_log_odds(&mut all, &candidates, &log_odds);
+    let listed = Listed::of(&all);
     let count = all.len();
     let chosen = known.hypothesis.map(|asked| (asked, asked.checked_sub(1).and_then(|index| all.get(index).cloned())));
-    let candidates = deformed(all, a, b, &comparison, comparisons);
-    let log_odds: Vec<f64> = candidates.iter().map(|candidate| log_odds(candidate, is_expected)).collect();
     let probabilities = posterior(&log_odds);
     if let Some((asked, chosen)) = chosen {
         let number = chosen.as_ref().map_or(0, |chosen| chosen.number);
@@ -149,6 +150,16 @@ pub fn posterior(log_odds: &[f64]) -> Vec<f64> {
     let most = log_odds.iter().copied().fold(0.0, f64::max);
     let sum = (-most).exp() + log_odds.iter().map(|odds| (odds - most).exp()).sum::<f64>();
     log_odds.iter().map(|odds| (odds - most).exp() / sum).collect()
+}
+
+/// Sorts candidates by the log-odds of those that they have become by deformation, the most probable first: the order
+/// of the list that the user chooses from.
+fn sort_by_log_odds(all: &mut [Candidate], deformed: &[Candidate], log_odds: &[f64]) {
+    let of = |candidate: &Candidate| {
+        let known = deformed.iter().position(|deformed| deformed.has(candidate.number));
+        known.map_or(f64::NEG_INFINITY, |number| log_odds[number])
+    };
+    all.sort_by(|one, other| of(other).total_cmp(&of(one)));
 }
 
 /// Merges candidates with the same relative pose.

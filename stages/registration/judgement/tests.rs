@@ -359,6 +359,16 @@ fn a_hypothesis_that_was_listed_can_be_chosen() {
 }
 
 #[test]
+fn hypotheses_are_listed_by_their_probability() {
+    let (a, b, [one, other]) = ambiguous();
+    for (probable, less) in [(one, other), (other, one)] {
+        let verdict = judged(&a, &b, &by_maps_alike(&[probable, less]));
+        let first = verdict.listed.0[0];
+        assert_eq!((first.x, first.y), (probable.translation.x, probable.translation.y));
+    }
+}
+
+#[test]
 fn hypotheses_at_one_pose_are_listed_once() {
     let (a, b, [first, second]) = ambiguous();
     let beside = pose(0.04, -0.03, 0.005) * second;
