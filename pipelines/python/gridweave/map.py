@@ -1,39 +1,61 @@
 """Occupancy grids."""
 
 import math
+import operator
 import warnings
 from dataclasses import dataclass
-from os import PathLike
-from typing import Any
+from pathlib import Path
+from typing import Any, Iterable
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from . import _native
+from .request import FilePath, path_of
 
 
 @dataclass(frozen=True, eq=False)
 class Map:
-    """An occupancy grid: what the map server of ROS has in a YAML file and an image, or a ``nav_msgs/msg/OccupancyGrid``."""
+    """An occupancy grid: what the map server of ROS has in a YAML file and an image, or a ``nav_msgs/msg/OccupancyGrid``.
 
-    #: -1 unknown, 0 free to 100 occupied, as int8; rows by columns. Row 0 is at the origin, so the picture of a map file is upside
-    #: down to it.
-    cells: np.ndarray
-    #: The side of a cell, metres.
+    It is made of an array of cells in one of these forms:
+
+    - whole numbers: -1 unknown, 0 free to 100 occupied; as uint8 also 255 for unknown, as int8 is read by others, if some cell is from 1
+      to 100; as floats also NaN for unknown;
+    - fractions: the probability that the cell is occupied, 0 to 1, with NaN or -1 where it is unknown;
+    - true for occupied, and false for free.
+
+    Floats that are all from 0 to 1, NaN or -1 are fractions. The masked cells of a masked array are unknown.
+
+    Attributes:
+        cells: -1 unknown, 0 free to 100 occupied, as int8; rows by columns. Row 0 is at the origin, so the picture of a map file is
+            upside down to it.
+        resolution: The side of a cell, metres.
+        origin: The pose of the outer corner of cell (0, 0) in the map frame, as x and y (metres) and yaw (radians).
+
+    Raises:
+        RequestError: The cells, the resolution or the origin are no such.
+    """
+
+    cells: NDArray[np.int8]
     resolution: float
-    #: The pose of the outer corner of cell (0, 0) in the map frame, as x and y (metres) and yaw (radians).
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "cells", _cells_of(self.cells))
-        object.__setattr__(self, "origin", tuple(float(part) for part in self.origin))
-        if len(self.origin) != 3 or not all(map(math.isfinite, self.origin)):
-            raise _native.RequestError(f"the origin of a map is (x, y, yaw), and not {self.origin}")
-        if not (math.isfinite(self.resolution) and self.resolution > 0):
-            raise _native.RequestError(f"the resolution of a map is a length in metres, and not {self.resolution}")
+    def __init__(self, cells: ArrayLike, resolution: float, origin: Iterable[float] = (0.0, 0.0, 0.0)) -> None:
+        object.__setattr__(self, "cells", _cells_of(cells))
+        object.__setattr__(self, "resolution", _resolution_of(resolution))
+        object.__setattr__(self, "origin", _origin_of(origin))
 
     @classmethod
-    def load(cls, file: str | PathLike[str]) -> "Map":
-        """Reads a map file: the YAML of nav2's map server, with its image."""
+    def load(cls, file: FilePath) -> "Map":
+        """Reads a map file: the YAML of nav2's map server, with its image.
+
+        Raises:
+            RequestError: It is the image alone.
+            GridweaveError: It cannot be read.
+        """
+        if is_image(Path(path_of(file))):
+            raise _native.RequestError(f"{file} is an image: give the YAML file of the map instead, which says how large its cells are")
         (cells, resolution, origin), warning = _native.load_map(file)
         if warning:
             warnings.warn(f"{file}: {warning}", stacklevel=2)
@@ -41,14 +63,25 @@ class Map:
 
     @classmethod
     def from_message(cls, message: Any) -> "Map":
-        """Makes a map of a ``nav_msgs/msg/OccupancyGrid`` of rclpy, rosbags, mcap or `gridweave.msg`: anything that has its fields."""
-        info = message.info
-        position, q = info.origin.position, info.origin.orientation
-        yaw = math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
-        cells = np.asarray(message.data, dtype=np.int8)
-        if cells.size != info.height * info.width:
-            raise _native.RequestError(f"the message says {info.width} x {info.height} cells, and has {cells.size}")
-        return cls(cells.reshape(info.height, info.width), info.resolution, (position.x, position.y, yaw))
+        """Makes a map of a ``nav_msgs/msg/OccupancyGrid`` of rclpy, rosbags, mcap or `gridweave.msg`: anything that has its fields.
+
+        Raises:
+            RequestError: Its fields are those of no map.
+        """
+        try:
+            info = message.info
+            position, q = info.origin.position, info.origin.orientation
+            yaw = math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z))
+            width, height = operator.index(info.width), operator.index(info.height)
+            resolution, at = info.resolution, (position.x, position.y, yaw)
+            cells = np.asarray(message.data)
+        except (AttributeError, TypeError, ValueError) as error:
+            raise _native.RequestError(f"this is no message with an occupancy grid: {error}") from None
+        if cells.size and cells.dtype.kind not in "iu":
+            raise _native.RequestError(f"the cells of a message are whole numbers from -1 to 100, and not {_kind(cells.dtype)}")
+        if cells.size != height * width:
+            raise _native.RequestError(f"the message says {width} x {height} cells, and has {cells.size}")
+        return cls(cells.reshape(height, width) if cells.size else np.empty((height, width), np.int8), resolution, at)
 
     def to_message(self, frame_id: str = "map") -> Any:
         """Makes a ``nav_msgs/msg/OccupancyGrid`` of `gridweave.msg`."""
@@ -62,8 +95,15 @@ class Map:
         info.origin.orientation.z, info.origin.orientation.w = math.sin(yaw / 2), math.cos(yaw / 2)
         return message
 
-    def save(self, file: str | PathLike[str]) -> None:
-        """Writes a map file: FILE.yaml of nav2's map server, with the image beside it."""
+    def save(self, file: FilePath) -> None:
+        """Writes a map file: FILE.yaml of nav2's map server, with the image beside it.
+
+        Raises:
+            RequestError: The name of the file ends neither in .yaml nor in .yml.
+            GridweaveError: It cannot be written.
+        """
+        if not is_yaml(Path(path_of(file))):
+            raise _native.RequestError(f"a map is written as a YAML file, with its image beside it, and not as {file}: give {Path(file).stem or 'map'}.yaml")
         _native.save_map(file, self.cells, self.resolution, self.origin)
 
     @property
@@ -78,29 +118,87 @@ class Map:
         return f"<Map of {columns} x {rows} cells of {self.resolution:.3g} m>"
 
 
-def _cells_of(given: Any) -> np.ndarray:
-    """The cells of an array: integers are occupancies from -1 to 100, fractions probabilities with NaN for unknown cells, and true
-    is occupied."""
-    given = np.asarray(given)
+def is_yaml(file: Path) -> bool:
+    """Whether the name of a file is that of a map."""
+    return file.suffix.lower() in (".yaml", ".yml")
+
+
+def is_image(file: Path) -> bool:
+    """Whether the name of a file is that of an image."""
+    return file.suffix.lower() in (".pgm", ".png", ".pbm", ".ppm", ".bmp", ".jpg", ".jpeg")
+
+
+def _resolution_of(given: Any) -> float:
+    resolution = math.nan if isinstance(given, (str, bytes, bool)) else given
+    try:
+        resolution = float(resolution)
+    except (TypeError, ValueError):
+        resolution = math.nan
+    if not (math.isfinite(resolution) and resolution > 0):
+        raise _native.RequestError(f"the resolution of a map is a length in metres, and not {given!r}")
+    return resolution
+
+
+def _origin_of(given: Any) -> tuple[float, float, float]:
+    try:
+        x, y, yaw = (float(part) for part in given)
+    except (TypeError, ValueError):
+        x = y = yaw = math.nan
+    if not all(map(math.isfinite, (x, y, yaw))):
+        raise _native.RequestError(f"the origin of a map is (x, y, yaw), and not {given!r}")
+    return x, y, yaw
+
+
+def _cells_of(given: Any) -> NDArray[np.int8]:
+    """The cells of an array, see `Map`."""
+    try:
+        mask = np.ma.getmaskarray(given) if isinstance(given, np.ma.MaskedArray) else None
+        given = np.asarray(given)
+    except (TypeError, ValueError):
+        raise _native.RequestError("the cells of a map are an array of rows and columns, and the rows of this one are of several lengths") from None
     if given.ndim != 2:
-        raise _native.RequestError(f"a map is an array of rows and columns, and not of {given.ndim} dimensions")
-    if given.dtype == np.int8:
-        cells = given
-    elif given.dtype.kind == "b":
-        cells = np.where(given, np.int8(100), np.int8(0))
+        hint = ": a picture in colours is converted to grey first" if given.ndim == 3 else ""
+        raise _native.RequestError(f"a map is an array of rows and columns, and not of {given.ndim} dimensions{hint}")
+    known = np.ones(given.shape, bool) if mask is None else ~mask
+    if given.dtype.kind == "b":
+        scaled = np.where(given, np.int8(100), np.int8(0))
     elif given.dtype.kind in "iu":
-        cells = given
+        scaled = given
+        # A picture in black and white has 0 and 255, too.
+        if given.dtype == np.uint8 and ((given >= 1) & (given <= 100)).any():
+            known &= given != 255
     elif given.dtype.kind == "f":
-        known = np.isfinite(given)
-        if known.any() and not (0 <= given[known].min() and given[known].max() <= 1):
-            raise _native.RequestError("the cells of a map of fractions are probabilities from 0 to 1, or NaN where they are unknown")
-        cells = np.full(given.shape, -1, np.int8)
-        cells[known] = np.rint(given[known] * 100)
+        known &= np.isfinite(given) & (given != -1)
+        of_known = given[known]
+        if ((of_known >= 0) & (of_known <= 1)).all():
+            scaled = np.where(known, np.rint(np.where(known, given, 0) * 100), -1)
+        elif (of_known == np.rint(of_known)).all():
+            scaled = given
+        else:
+            raise _native.RequestError(
+                "the cells of a map of fractions are probabilities from 0 to 1, with NaN or -1 where they are unknown, and these are from "
+                f"{of_known.min():g} to {of_known.max():g}" + _OF_PICTURES
+            )
     else:
-        raise _native.RequestError(f"the cells of a map are numbers, and not {given.dtype}")
-    if cells.size and not (-1 <= cells.min() and cells.max() <= 100):
+        raise _native.RequestError(f"the cells of a map are numbers, and not {_kind(given.dtype)}")
+    of_known = scaled[known]
+    if of_known.size and not (-1 <= of_known.min() and of_known.max() <= 100):
         raise _native.RequestError(
-            f"the cells of a map are from -1 (unknown) and 0 (free) to 100 (occupied), and these from {cells.min()} to {cells.max()}: "
-            "an image is read by `Map.load` with its YAML file"
+            f"the cells of a map are from -1 (unknown) and 0 (free) to 100 (occupied), and these from {of_known.min():g} to "
+            f"{of_known.max():g}" + _OF_PICTURES
         )
-    return np.ascontiguousarray(cells, dtype=np.int8)
+    if known.all():
+        return np.ascontiguousarray(scaled, dtype=np.int8)
+    cells = np.full(given.shape, -1, np.int8)
+    cells[known] = of_known
+    return cells
+
+
+_OF_PICTURES = (
+    ": `Map.load` reads an image file by its YAML file, and an array of 8 bits with white floor and black walls, row 0 on top, is a map as "
+    "`(255 - picture[::-1]) / 255`, though without unknown cells"
+)
+
+
+def _kind(dtype: np.dtype[Any]) -> str:
+    return {"U": "texts", "S": "bytes", "O": "objects", "f": "fractions", "b": "true and false"}.get(dtype.kind, dtype.name)

@@ -1,42 +1,131 @@
 """The settings of a run, and its progress."""
 
 import contextlib
+import functools
+import importlib
+import math
+import operator
+import os
 from os import PathLike
-from typing import Any, Callable, Iterator, Mapping, Sequence
+from typing import Any, Callable, Iterator, Literal, Mapping, Protocol, Sequence
 
 from . import _native
 
+#: The path of a file.
+FilePath = str | PathLike[str]
 #: True for a bar of tqdm, or a function that is given the share that is done, 0 to 1.
-Progress = bool | Callable[[float], None]
+Progress = bool | Callable[[float], Any]
 
 
-def request(
+class Posed(Protocol):
+    """What has a pose, such as a `gridweave.Frame`."""
+
+    @property
+    def x(self) -> float:
+        """Metres."""
+
+    @property
+    def y(self) -> float:
+        """Metres."""
+
+    @property
+    def yaw(self) -> float:
+        """Radians."""
+
+
+Initial = Mapping[str, Sequence[float] | Posed]
+Accept = Mapping[str, int | Literal["initial"]]
+
+
+def settings(
     *,
     reference: str | None,
-    initial: Mapping[str, Sequence[float]] | None,
-    accept: Mapping[str, int | str] | None,
+    initial: Initial | None = None,
+    accept: Accept | None = None,
     parameters: Mapping[str, Any] | None,
     seed: int | None,
-    output: str | PathLike[str] | None,
-) -> _native.Request:
-    """The settings as the command line has them."""
-    if seed is not None and not 0 <= seed < 1 << 64:
-        raise _native.RequestError(f"a seed is a number from 0 on of at most 64 bits, and not {seed}")
-    return _native.Request(
+) -> Callable[[str | None], _native.Request]:
+    """The settings as the command line has them, as they are at the time of the call: a function of the file of the output.
+
+    Raises:
+        RequestError: One is of a kind that it cannot be.
+    """
+    if not isinstance(reference, (str, type(None))):
+        raise _native.RequestError(f"`reference` is the name of a robot, and not {reference!r}")
+    return functools.partial(
+        _request,
         reference=reference,
-        initial=[f"{robot}={_pose(robot, pose)}" for robot, pose in (initial or {}).items()],
-        accept=[f"{robot}={number}" for robot, number in (accept or {}).items()],
-        settings=[f"{name}={_toml(value)}" for name, value in (parameters or {}).items()],
-        seed=seed,
-        output=output,
+        initial=[f"{robot}={_pose(robot, pose)}" for robot, pose in _items("initial", initial, "(x, y, yaw)")],
+        accept=[f"{robot}={_hypothesis(robot, number)}" for robot, number in _items("accept", accept, "2")],
+        settings=[f"{name}={_toml(value)}" for name, value in _items("parameters", parameters, "VALUE", "STAGE.PARAMETER")],
+        seed=_seed(seed),
     )
 
 
-def _pose(robot: str, pose: Sequence[float]) -> str:
+def _request(output: str | None, **asked: Any) -> _native.Request:
+    return _native.Request(output=output, **asked)
+
+
+def _items(argument: str, given: Any, value: str, name: str = "ROBOT") -> list[tuple[str, Any]]:
+    if given is None:
+        return []
+    if not isinstance(given, Mapping) or not all(isinstance(key, str) for key in given):
+        raise _native.RequestError(f'`{argument}` is a mapping, as {{"{name}": {value}}}, and not {given!r}')
+    return list(given.items())
+
+
+def _seed(seed: Any) -> int | None:
+    if seed is None:
+        return None
     try:
-        return ",".join(repr(float(number)) for number in pose)
+        number = operator.index(seed)
+    except TypeError:
+        number = -1
+    if isinstance(seed, bool) or not 0 <= number < 1 << 64:
+        raise _native.RequestError(f"a seed is a whole number from 0 on of at most 64 bits, and not {seed!r}")
+    return number
+
+
+def _pose(robot: str, pose: Any) -> str:
+    if all(hasattr(pose, part) for part in ("x", "y", "yaw")):
+        pose = (pose.x, pose.y, pose.yaw)
+    try:
+        numbers = [] if isinstance(pose, (str, bytes)) else [float(number) for number in pose]
     except (TypeError, ValueError):
-        raise _native.RequestError(f"the initial pose of `{robot}` is (x, y, yaw) in numbers, and not {pose!r}") from None
+        numbers = []
+    if not 3 <= len(numbers) <= 5 or not all(map(math.isfinite, numbers)):
+        raise _native.RequestError(
+            f"the initial pose of `{robot}` is a Frame or (x, y, yaw) in numbers, with the standard deviations of the position and of the "
+            f"yaw behind them if they are known, and not {pose!r}"
+        )
+    return ",".join(map(repr, numbers))
+
+
+def _hypothesis(robot: str, number: Any) -> str:
+    if isinstance(number, str) and number == "initial":
+        return number
+    try:
+        index = operator.index(number)
+    except TypeError:
+        index = 0
+    if isinstance(number, bool) or index < 1:
+        raise _native.RequestError(
+            f'`accept` of `{robot}` is the number of a hypothesis that a refusal has listed, from 1, or "initial" for its initial pose as it '
+            f"is, and not {number!r}"
+        )
+    return str(index)
+
+
+def path_of(file: Any) -> str:
+    """The path of a file, as a text.
+
+    Raises:
+        RequestError: It is no path.
+    """
+    path = os.fspath(file) if isinstance(file, (str, PathLike)) else None
+    if not isinstance(path, str):
+        raise _native.RequestError(f"a file is given by its path, a text or a Path, and not by {file!r}")
+    return path
 
 
 def _toml(value: Any) -> str:
@@ -57,16 +146,28 @@ def _toml(value: Any) -> str:
     raise _native.RequestError(f"a parameter is a number, a text, true or false, or a list of these, and not {value!r}")
 
 
+def needed(module: str, what: str, extra: str) -> Any:
+    """A module of a package that is not installed with this one.
+
+    Raises:
+        RequestError: It is not installed.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        package = module.partition(".")[0]
+        raise _native.RequestError(f"{what} needs {package}, which is not installed: pip install 'gridweave[{extra}]'") from None
+
+
 @contextlib.contextmanager
-def watch(progress: Progress, what: str) -> Iterator[Callable[[float], None] | None]:
+def watch(progress: Progress, what: str) -> Iterator[Callable[[float], Any] | None]:
     """What reports the progress of a run."""
     if not progress:
         yield None
     elif callable(progress):
         yield progress
     else:
-        from tqdm.auto import tqdm
-
+        tqdm = needed("tqdm.auto", "`progress=True`", "progress").tqdm
         with tqdm(total=1.0, desc=what, bar_format="{desc} {percentage:3.0f} % |{bar}| {elapsed}") as bar:
             yield lambda share: bar.update(share - bar.n)
             bar.update(1.0 - bar.n)

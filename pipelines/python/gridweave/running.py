@@ -2,21 +2,23 @@
 
 import functools
 import json
+import os
 from os import PathLike
 from typing import Any, Callable, Iterable, Mapping
 
 from . import _native
 from .in_process import InProcess
-from .request import Progress, request, watch
+from .inputs import of_files
+from .request import FilePath, Progress, path_of, settings
 from .result import MergeResult
 from .stages import Stage
 
 
 def run(
-    pipeline: str | PathLike[str],
-    inputs: Iterable[str | PathLike[str]] = (),
+    pipeline: FilePath,
+    inputs: FilePath | Iterable[FilePath] = (),
     *,
-    output: str | PathLike[str] | None = None,
+    output: FilePath | None = None,
     stages: Mapping[str, type[Stage] | Callable[..., Any]] | None = None,
     reference: str | None = None,
     parameters: Mapping[str, Any] | None = None,
@@ -35,22 +37,31 @@ def run(
 
     Raises:
         RequestError: The pipeline or the request is wrong.
-        GridweaveError: A stage has failed.
+        GridweaveError: A stage has failed. Its cause (``__cause__``) is the exception of a stage of one's own.
     """
-    files = [inputs] if isinstance(inputs, (str, PathLike)) else list(inputs)
-    kinds = [_kind(name, made) for name, made in (stages or {}).items()]
+    listed = [inputs] if isinstance(inputs, (str, PathLike)) else list(inputs)
+    named = path_of(pipeline)
+    # A shipped pipeline has no file.
+    place = os.path.abspath(named) if os.path.exists(named) else named
+    kinds = [_interface(name, made) for name, made in (stages or {}).items()]
 
-    def start(output: str | PathLike[str] | None, progress: Progress = False) -> tuple[str, Any]:
-        asked = request(reference=reference, initial=None, accept=None, parameters=parameters, seed=seed, output=output)
-        with watch(progress, "run") as report:
-            return _native.run_pipeline(pipeline, files, asked, kinds, report)
+    def start(files: list[str], asked: _native.Request, report: Callable[[float], Any] | None) -> tuple[str, Any]:
+        raised: list[Exception] = []
+        made = [(name, interface, functools.partial(InProcess, kind, raised)) for name, interface, kind in kinds]
+        try:
+            return _native.run_pipeline(named if os.path.abspath(named) == place else place, files, asked, made, report)
+        except _native.GridweaveError as error:
+            if raised:
+                raise error from raised[0]
+            raise
 
-    return MergeResult(*start(output, progress), rerun=start)
+    asked = settings(reference=reference, parameters=parameters, seed=seed)
+    return MergeResult.of_run(of_files([path_of(one) for one in listed], start), asked, output, progress, "run")
 
 
-def _kind(name: str, made: Any) -> tuple[str, str, Callable[[str], InProcess]]:
-    """A kind of stage: its name, its interface, and what makes one."""
+def _interface(name: str, made: Any) -> tuple[str, str, type[Stage]]:
+    """A kind of stage: its name, its interface, and its class."""
     made = getattr(made, "__gridweave_stage__", made)
     if not (isinstance(made, type) and issubclass(made, Stage)):
         raise _native.RequestError(f"the stage `{name}` is a class made of Stage, or a function made a stage by @stage, and not {made!r}")
-    return name, json.dumps(made.interface()), functools.partial(InProcess, made)
+    return name, json.dumps(made.interface()), made
