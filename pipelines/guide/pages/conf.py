@@ -7,7 +7,7 @@ from pathlib import Path
 
 from docutils import nodes
 from sphinx import addnodes
-from sphinx.ext.napoleon import GoogleDocstring
+from sphinx.ext.napoleon import Config, GoogleDocstring
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[2]
@@ -48,6 +48,9 @@ html_static_path = ["static"]
 html_css_files = ["pages.css"]
 html_copy_source = False
 html_show_sphinx = False
+
+#: Attributes are listed in the description of their class.
+DOCSTRINGS = Config(napoleon_use_ivar=True)
 
 #: What stands in the table of contents below a page: captions, and pages with their short titles.
 CONTENTS = {
@@ -134,9 +137,11 @@ def link_folders(app, doctree):
 
 
 def read_arguments(app, what, name, obj, options, lines):
-    """The sections `Args` and `Raises` of docstrings. The comments of attributes have none: there a colon is a colon."""
+    """The sections `Args`, `Attributes` and `Raises` of docstrings. The comments of attributes have none: there a colon is a colon."""
     if what not in ("attribute", "property", "data", "module"):
-        lines[:] = GoogleDocstring(lines, what=what, name=name, obj=obj, options=options).lines()
+        lines[:] = GoogleDocstring(lines, DOCSTRINGS, what=what, name=name, obj=obj, options=options).lines()
+        # The name by which numpy documents it.
+        lines[:] = [line.replace("numpy._typing._array_like.", "") for line in lines]
 
 
 def write_index(app, error):

@@ -15,6 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 from ._native import GridweaveError, RequestError, __version__
 
+__all__ = [
+    "About", "Context", "Deformation", "Frame", "GridweaveError", "Group", "Input", "LoggedMessage", "Map", "MergeResult", "Output", "Pair",
+    "Parameter", "RequestError", "Stage", "StageStatistics", "__version__", "merge", "read_log", "run", "stage",
+]
+
 if TYPE_CHECKING:
     from .log import LoggedMessage, read_log
     from .map import Map
@@ -22,26 +27,23 @@ if TYPE_CHECKING:
     from .result import Deformation, Frame, Group, MergeResult, Pair, StageStatistics
     from .running import run
     from .stages import About, Context, Input, Output, Parameter, Stage, stage
+else:
+    #: The module of each name. They are imported when they are used, as the command needs none of them.
+    _MODULES = {
+        "LoggedMessage": "log", "read_log": "log", "Map": "map", "merge": "merging", "run": "running",
+        "Deformation": "result", "Frame": "result", "Group": "result", "MergeResult": "result", "Pair": "result",
+        "StageStatistics": "result",
+        "About": "stages", "Context": "stages", "Input": "stages", "Output": "stages", "Parameter": "stages", "Stage": "stages",
+        "stage": "stages",
+    }
 
-#: The module of each name. They are imported when they are used, as the command needs none of them.
-_MODULES = {
-    "LoggedMessage": "log", "read_log": "log", "Map": "map", "merge": "merging", "run": "running",
-    "Deformation": "result", "Frame": "result", "Group": "result", "MergeResult": "result", "Pair": "result",
-    "StageStatistics": "result",
-    "About": "stages", "Context": "stages", "Input": "stages", "Output": "stages", "Parameter": "stages", "Stage": "stages",
-    "stage": "stages",
-}
-
-__all__ = ["GridweaveError", "RequestError", "__version__", *_MODULES]
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    # A module of the same name as what it defines would hide it.
-    value = getattr(importlib.import_module(f".{_MODULES[name]}", __name__), name)
-    globals()[name] = value
-    return value
+    def __getattr__(name: str) -> Any:
+        if name not in _MODULES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        # A module of the same name as what it defines would hide it.
+        value = getattr(importlib.import_module(f".{_MODULES[name]}", __name__), name)
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:

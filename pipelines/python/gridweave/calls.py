@@ -8,7 +8,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
-import iceoryx2 as iox2
+import iceoryx2 as iox2  # type: ignore[import-untyped]  # it has no types
 
 from .msg import encode_into, size
 from .stages import PROTOCOL, About

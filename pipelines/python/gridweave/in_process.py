@@ -4,7 +4,9 @@ import contextlib
 import json
 from typing import Any, Iterator
 
-from .msg import SerdeError, decode, encode
+from rosbags.serde import SerdeError
+
+from .msg import decode, encode
 from .stages import About, Context, Input, Stage
 
 #: What a call returns: the sent messages (output, robot, log time, bytes), the warnings, and whether a source has ended.

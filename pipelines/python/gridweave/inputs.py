@@ -52,6 +52,7 @@ def given(inputs: Any, resolution: float | None) -> Given:
     Raises:
         RequestError: They are none, or cannot be merged with each other.
     """
+    named: list[tuple[str | None, Any]]
     if isinstance(inputs, Mapping):
         named = [(_robot(name), one) for name, one in inputs.items()]
     else:

@@ -20,12 +20,12 @@ class Map:
 
     It is made of an array of cells in one of these forms:
 
-    - whole numbers: -1 unknown, 0 free to 100 occupied; as uint8 also 255 for unknown, as int8 is read by others, if some cell is from 1
-      to 100; as floats also NaN for unknown;
-    - fractions: the probability that the cell is occupied, 0 to 1, with NaN or -1 where it is unknown;
+    - whole numbers: -1 unknown, 0 free to 100 occupied. In an array of uint8, 255 is unknown (-1, read as uint8) if some cell is from 1 to
+      100; without one it could be a picture in black and white, and is refused. In one of floats, NaN is unknown, too.
+    - fractions, if all are from 0 to 1: the probability that the cell is occupied, with NaN or -1 where it is unknown.
     - true for occupied, and false for free.
 
-    Floats that are all from 0 to 1, NaN or -1 are fractions. The masked cells of a masked array are unknown.
+    The masked cells of a masked array are unknown.
 
     Attributes:
         cells: -1 unknown, 0 free to 100 occupied, as int8; rows by columns. Row 0 is at the origin, so the picture of a map file is

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from .inputs import MapInput, given
 from .request import Accept, FilePath, Initial, Progress, settings
-from .result import MergeResult
+from .result import MergeResult, result_of
 
 
 def merge(
@@ -47,4 +47,4 @@ def merge(
         GridweaveError: The merge has failed.
     """
     asked = settings(reference=reference, initial=initial, accept=accept, parameters=parameters, seed=seed)
-    return MergeResult.of_run(given(inputs, resolution), asked, output, progress, "merge")
+    return result_of(given(inputs, resolution), asked, output, progress, "merge")

@@ -6,6 +6,7 @@ stage gets them.
 
 import ctypes
 import faulthandler
+import io
 import json
 import os
 import signal
@@ -13,9 +14,11 @@ import sys
 import traceback
 from typing import Any, Callable, Iterator
 
+from rosbags.serde import SerdeError
+
 from .calls import Calls, What
 from .load import load
-from .msg import SerdeError, decode
+from .msg import decode
 from .stages import About, Context, Stage
 
 
@@ -114,7 +117,8 @@ def main() -> None:
     os.dup2(nothing, 0)
     # What a stage prints must not go to the doorbell.
     os.dup2(2, 1)
-    sys.stdout.reconfigure(line_buffering=True)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)
     module, folder = sys.argv[1:]
     Program(module, Calls(folder, doorbell_in, doorbell_out)).serve()
 

@@ -158,23 +158,6 @@ class MergeResult:
         self._rerun = rerun
         self._inputs = list(inputs)
 
-    @classmethod
-    def of_run(
-        cls, given: Given, asked: Callable[[str | None], _native.Request], output: FilePath | None, progress: Progress, what: str
-    ) -> "MergeResult":
-        """Runs what was asked for on what was given. It is for the functions of this package.
-
-        Raises:
-            RequestError: The request is wrong.
-            GridweaveError: The run has failed.
-        """
-        file = None if output is None else path_of(output)
-        if file is not None:
-            check_is_no_input(Path(file), given.files)
-        with watch(progress, what) as report:
-            summary, grid = given.run(asked(file), report)
-        return cls(summary, grid, lambda output: given.run(asked(output), None), given.files)
-
     def __getstate__(self) -> dict[str, Any]:
         # The inputs of a run may be anything, such as a stage of the user's own.
         return self.__dict__ | {"_rerun": None}
@@ -347,6 +330,23 @@ def _frames(frames: dict[str, Any]) -> dict[str, Frame]:
         robot: Frame(frame["x"], frame["y"], frame["yaw"], np.array(frame["covariance"]).reshape(3, 3))
         for robot, frame in frames.items()
     }
+
+
+def result_of(
+    given: Given, asked: Callable[[str | None], _native.Request], output: FilePath | None, progress: Progress, what: str
+) -> MergeResult:
+    """Runs what was asked for on what was given.
+
+    Raises:
+        RequestError: The request is wrong.
+        GridweaveError: The run has failed.
+    """
+    file = None if output is None else path_of(output)
+    if file is not None:
+        check_is_no_input(Path(file), given.files)
+    with watch(progress, what) as report:
+        summary, grid = given.run(asked(file), report)
+    return MergeResult(summary, grid, lambda output: given.run(asked(output), None), given.files)
 
 
 def _points(given: ArrayLike) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from . import _native
 from .in_process import InProcess
 from .inputs import of_files
 from .request import FilePath, Progress, path_of, settings
-from .result import MergeResult
+from .result import MergeResult, result_of
 from .stages import Stage
 
 
@@ -56,7 +56,7 @@ def run(
             raise
 
     asked = settings(reference=reference, parameters=parameters, seed=seed)
-    return MergeResult.of_run(of_files([path_of(one) for one in listed], start), asked, output, progress, "run")
+    return result_of(of_files([path_of(one) for one in listed], start), asked, output, progress, "run")
 
 
 def _interface(name: str, made: Any) -> tuple[str, str, type[Stage]]:

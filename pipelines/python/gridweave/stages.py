@@ -5,7 +5,7 @@ import inspect
 import operator
 import typing
 from dataclasses import dataclass
-from typing import Any, Callable
+from typing import Any, Callable, TypeVar
 
 from .msg import definition, ros_type
 
@@ -17,14 +17,18 @@ _JSON_TYPES = {float: "number", int: "integer", str: "string", bool: "boolean"}
 
 @dataclass(frozen=True)
 class Input:
-    """An input, for messages of one type. A method ``on_NAME(self, message, about)`` is given each message that comes in on it."""
+    """An input, for messages of one type. A method ``on_NAME(self, message, about)`` is given each message that comes in on it.
+
+    Attributes:
+        type: The type of its messages.
+        summary: What it is for.
+        many: Whether any number of outputs may be wired to it; otherwise it is one.
+        optional: Whether it may be left unwired.
+    """
 
     type: type
-    #: What it is for.
     summary: str = ""
-    #: Whether any number of outputs may be wired to it; otherwise it is one.
     many: bool = False
-    #: Whether it may be left unwired.
     optional: bool = False
 
 
@@ -61,20 +65,24 @@ class Output:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a stage, which a pipeline file may set; in the stage it is the value. It is of the type of its default."""
+    """A parameter of a stage, which a pipeline file may set; in the stage it is the value. It is of the type of its default.
+
+    Attributes:
+        default: Its value where none is set: a number, a text, true or false, or a list of one of these.
+        summary: What it means, with its unit: metres, radians, seconds.
+        minimum: The least value.
+        maximum: The greatest value.
+        above: Values are greater than this.
+        below: Values are less than this.
+        choices: The only values that a text may have.
+    """
 
     default: Any
-    #: What it means, with its unit: metres, radians, seconds.
     summary: str = ""
-    #: The least value.
     minimum: float | None = None
-    #: The greatest value.
     maximum: float | None = None
-    #: Values are greater than this.
     above: float | None = None
-    #: Values are less than this.
     below: float | None = None
-    #: The only values that a text may have.
     choices: tuple[str, ...] | None = None
 
     def schema(self) -> dict[str, Any]:
@@ -105,31 +113,37 @@ def _schema_of(default: Any) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class About:
-    """Metadata of a message."""
+    """Metadata of a message.
 
-    #: The robot that it is about; empty if it is about none in particular.
+    Attributes:
+        robot: The robot that it is about; empty if it is about none in particular.
+        log_time: When it was logged, nanoseconds.
+        topic: The topic that it has, or will have, in a log.
+        wire: Which of the stage's wires it came on, as an index into `Context.inputs`.
+    """
+
     robot: str
-    #: When it was logged, nanoseconds.
     log_time: int
-    #: The topic that it has, or will have, in a log.
     topic: str
-    #: Which of the stage's wires it came on, as an index into `Context.inputs`.
     wire: int
 
 
 @dataclass(frozen=True)
 class Context:
-    """Context of a stage in its pipeline."""
+    """Context of a stage in its pipeline.
 
-    #: The stage's name in the pipeline.
+    Attributes:
+        stage: The stage's name in the pipeline.
+        seed: Seeds the stage's randomness: ``numpy.random.default_rng(self.context.seed)``.
+        reference: The robot whose map frame is the world, if the pipeline says so.
+        robots: Topics of each robot, as in the section ``[robots]``.
+        inputs: What is wired to the stage, each with ``port``, ``from``, ``type`` and ``topic``.
+    """
+
     stage: str = ""
-    #: Seeds the stage's randomness: ``numpy.random.default_rng(self.context.seed)``.
     seed: int = 0
-    #: The robot whose map frame is the world, if the pipeline says so.
     reference: str | None = None
-    #: Topics of each robot, as in the section ``[robots]``.
     robots: dict[str, Any] | None = None
-    #: What is wired to the stage, each with ``port``, ``from``, ``type`` and ``topic``.
     inputs: tuple[dict[str, str], ...] = ()
 
 
@@ -230,7 +244,7 @@ class Stage:
             setattr(made, name, output._tied(functools.partial(send, name)))
         made._warn = warn
         made.context = context or Context()
-        made.__init__()
+        made.__init__()  # type: ignore[misc]  # that of a stage takes nothing
         return made
 
 
@@ -261,7 +275,18 @@ def _rising(send: Callable[..., None]) -> Callable[..., None]:
     return checked
 
 
-def stage(function: Callable[..., Any] | None = None, *, output: str = "out") -> Any:
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+@typing.overload
+def stage(function: Function, *, output: str = "out") -> Function: ...
+
+
+@typing.overload
+def stage(*, output: str = "out") -> Callable[[Function], Function]: ...
+
+
+def stage(function: Any = None, *, output: str = "out") -> Any:
     """Makes a stage of a function: its first argument is the input, its result goes to the output, and its keyword arguments are
     parameters.
 
@@ -270,7 +295,12 @@ def stage(function: Callable[..., Any] | None = None, *, output: str = "out") ->
     function itself stays as it was. ``output`` is the name of the output.
     """
     if function is None:
-        return lambda function: stage(function, output=output)
+        return lambda function: _stage_of(function, output)
+    return _stage_of(function, output)
+
+
+def _stage_of(function: Any, output: str) -> Any:
+    """Makes a stage of a function, see `stage`."""
     arguments = list(inspect.signature(function).parameters.values())
     hints = typing.get_type_hints(function)
     positional = [argument for argument in arguments if argument.kind is argument.POSITIONAL_OR_KEYWORD]
@@ -292,10 +322,10 @@ def stage(function: Callable[..., Any] | None = None, *, output: str = "out") ->
             if sent is not None:
                 getattr(self, output).send(sent, about.robot)
 
-    members = {keyword.name: Parameter(keyword.default) for keyword in keywords}
+    members: dict[str, Any] = {keyword.name: Parameter(keyword.default) for keyword in keywords}
     members |= {message: Input(hints[message]), output: Output(_sent_type(hints["return"])), f"on_{message}": on_message,
                 "__doc__": function.__doc__, "__module__": function.__module__}
-    function.__gridweave_stage__ = type(name, (Stage,), members)  # type: ignore[attr-defined]
+    function.__gridweave_stage__ = type(name, (Stage,), members)
     return function
 
 

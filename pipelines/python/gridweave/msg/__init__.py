@@ -24,7 +24,6 @@ from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Nodetype
-from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from .._native import GridweaveError, message_texts
@@ -67,8 +66,7 @@ def _field(name: str, desc: Any) -> tuple[str, Any, Any]:
 
 def _arrays(fields: Any) -> dict[str, np.dtype]:
     """The fields that are arrays of numbers."""
-    is_array = lambda desc: desc[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE)  # noqa: E731
-    numbers = ((name, desc[1][0]) for name, desc in fields if is_array(desc))
+    numbers = ((name, desc[1][0]) for name, desc in fields if desc[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE))
     return {name: np.dtype(_NUMPY[sub[1][0]]) for name, sub in numbers if sub[0] == Nodetype.BASE and sub[1][0] != "string"}
 
 
@@ -172,10 +170,10 @@ def definition(name: str) -> str | None:
 
 def ros_type(message_class: type) -> str:
     """The name of a message type, such as ``nav_msgs/msg/OccupancyGrid``."""
-    name = getattr(message_class, "__msgtype__", None)
+    name: Any = getattr(message_class, "__msgtype__", None)
     if name not in _STORE.types:
         raise TypeError(f"{message_class!r} is no message type: import one from gridweave.msg")
-    return name
+    return str(name)
 
 
 def decode(message_class: type, data: memoryview) -> Any:
