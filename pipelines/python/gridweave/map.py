@@ -152,7 +152,7 @@ def _origin_of(given: Any) -> tuple[float, float, float]:
 def _cells_of(given: Any) -> NDArray[np.int8]:
     """The cells of an array, see `Map`."""
     try:
-        mask = np.ma.getmaskarray(given) if isinstance(given, np.ma.MaskedArray) else None
+        mask = np.broadcast_to(given.mask, given.shape) if isinstance(given, np.ma.MaskedArray) else None
         given = np.asarray(given)
     except (TypeError, ValueError):
         raise _native.RequestError("the cells of a map are an array of rows and columns, and the rows of this one are of several lengths") from None

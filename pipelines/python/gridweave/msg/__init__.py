@@ -23,6 +23,7 @@ import types
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -64,7 +65,7 @@ def _field(name: str, desc: Any) -> tuple[str, Any, Any]:
     return name, np.ndarray, dataclasses.field(default_factory=lambda: np.zeros(length or 0, dtype))
 
 
-def _arrays(fields: Any) -> dict[str, np.dtype]:
+def _arrays(fields: Any) -> dict[str, np.dtype[Any]]:
     """The fields that are arrays of numbers."""
     numbers = ((name, desc[1][0]) for name, desc in fields if desc[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE))
     return {name: np.dtype(_NUMPY[sub[1][0]]) for name, sub in numbers if sub[0] == Nodetype.BASE and sub[1][0] != "string"}
@@ -81,7 +82,7 @@ def _set_attribute(self: Any, name: str, value: Any) -> None:
     object.__setattr__(self, name, value)
 
 
-def _checked(given: np.ndarray, dtype: np.dtype, name: str) -> np.ndarray:
+def _checked(given: NDArray[Any], dtype: np.dtype[Any], name: str) -> NDArray[Any]:
     if given.dtype.kind in "iu" and dtype.kind in "iu":
         fits = np.can_cast(given.dtype, dtype) or np.array_equal(given.astype(dtype), given)
     else:
