@@ -22,7 +22,9 @@ HEADER = '''"""The message types of `{package}`."""
 
 from dataclasses import Field
 from typing import Any, ClassVar
+'''
 
+NUMPY = '''
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 '''
@@ -40,7 +42,8 @@ def _stub(package: str, names: list[str]) -> str:
     classes = ["\n".join(_class(package, name)) for name in names]
     used = {inner.split("/")[0] for name in names for inner in msg._used(msg._STORE.fielddefs[name][1])} - {package}
     imports = f"\nfrom . import {', '.join(sorted(used))}\n" if used else ""
-    return HEADER.format(package=package) + imports + "".join(f"\n{one}\n" for one in classes)
+    numpy = NUMPY if any("NDArray" in one for one in classes) else ""
+    return HEADER.format(package=package) + numpy + imports + "".join(f"\n{one}\n" for one in classes)
 
 
 def _class(package: str, name: str) -> Iterator[str]:

@@ -60,7 +60,7 @@ def given(inputs: Any, resolution: float | None) -> Given:
     if all(is_path(one) for _, one in named):
         if resolution is not None and named:
             raise _native.RequestError("`resolution` is the side of a cell of arrays, and files and logs say their own: leave it out")
-        return of_files([path_of(one) if name is None else _typed(name, path_of(one)) for name, one in named], _native.merge_files)
+        return of_files([path_of(one) if name is None else f"{name}={path_of(one)}" for name, one in named], _native.merge_files)
     if resolution is not None and all(is_path(one) or _is_message(one) or isinstance(one, Map) for _, one in named):
         raise _native.RequestError("`resolution` is the side of a cell of arrays, and none of these is one: leave it out")
     for name, one in named:
@@ -110,10 +110,6 @@ def _robot(name: Any) -> str:
     if not isinstance(name, str) or not name or re.search(r"[/={}\x00-\x1f\x7f]", name):
         raise _native.RequestError(f"{name!r} is no name of a robot: that is a text without /, =, {{ and }}, as its topics are /ROBOT/map and others")
     return name
-
-
-def _typed(robot: str, path: str) -> str:
-    return f"{robot}={path}"
 
 
 def _parts(typed: FilePath) -> tuple[str | None, Path]:

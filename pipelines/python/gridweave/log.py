@@ -3,11 +3,10 @@
 import functools
 import warnings
 from dataclasses import dataclass, field
-from os import PathLike
 from typing import Any, Iterable, Iterator
 
 from . import _native
-from .request import FilePath, path_of
+from .request import FilePath, paths_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +53,7 @@ def read_log(logs: FilePath | Iterable[FilePath], topics: str | Iterable[str] | 
         RequestError: What is given is no path, or no topic.
         GridweaveError: A log cannot be opened.
     """
-    try:
-        paths = [path_of(log) for log in ([logs] if isinstance(logs, (str, PathLike)) else logs)]
-    except TypeError:
-        raise _native.RequestError(f"a log is given by its path, and several by a list of paths, and not by {logs!r}") from None
+    paths = paths_of(logs)
     wanted = None if topics is None else _topics_of(topics)
     return _messages(_native.LogMessages(paths), wanted)
 

@@ -7,7 +7,7 @@ import math
 import operator
 import os
 from os import PathLike
-from typing import Any, Callable, Iterator, Literal, Mapping, Protocol, Sequence
+from typing import Any, Callable, Iterable, Iterator, Literal, Mapping, Protocol, Sequence
 
 from . import _native
 
@@ -126,6 +126,19 @@ def path_of(file: Any) -> str:
     if not isinstance(path, str):
         raise _native.RequestError(f"a file is given by its path, a text or a Path, and not by {file!r}")
     return path
+
+
+def paths_of(files: Any) -> list[str]:
+    """The paths of one file or of several.
+
+    Raises:
+        RequestError: They are no paths.
+    """
+    if isinstance(files, (str, PathLike)):
+        return [path_of(files)]
+    if not isinstance(files, Iterable) or isinstance(files, (bytes, bytearray)):
+        raise _native.RequestError(f"a file is given by its path, and several by a list of paths, and not by {files!r}")
+    return [path_of(file) for file in files]
 
 
 def _toml(value: Any) -> str:

@@ -3,13 +3,12 @@
 import functools
 import json
 import os
-from os import PathLike
 from typing import Any, Callable, Iterable, Mapping
 
 from . import _native
 from .in_process import InProcess
 from .inputs import of_files
-from .request import FilePath, Progress, path_of, settings
+from .request import FilePath, Progress, path_of, paths_of, settings
 from .result import MergeResult, result_of
 from .stages import Stage
 
@@ -39,7 +38,7 @@ def run(
         RequestError: The pipeline or the request is wrong.
         GridweaveError: A stage has failed. Its cause (``__cause__``) is the exception of a stage of one's own.
     """
-    listed = [inputs] if isinstance(inputs, (str, PathLike)) else list(inputs)
+    listed = paths_of(inputs)
     named = path_of(pipeline)
     # A shipped pipeline has no file.
     place = os.path.abspath(named) if os.path.exists(named) else named
@@ -56,7 +55,7 @@ def run(
             raise
 
     asked = settings(reference=reference, parameters=parameters, seed=seed)
-    return result_of(of_files([path_of(one) for one in listed], start), asked, output, progress, "run")
+    return result_of(of_files(listed, start), asked, output, progress, "run")
 
 
 def _interface(name: str, made: Any) -> tuple[str, str, type[Stage]]:

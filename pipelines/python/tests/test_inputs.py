@@ -10,7 +10,7 @@ from unittest import mock
 import numpy as np
 
 import gridweave
-from gridweave import Frame, GridweaveError, Map, RequestError, merge, read_log, run
+from gridweave import Frame, Map, RequestError, merge, read_log, run
 
 from test_merge import message, room
 
@@ -211,6 +211,8 @@ class TopicsTest(InFolder):
     def test_what_is_no_log_or_no_topic_is_refused(self):
         self.refuses("a list of paths, and not by None", read_log, None)
         self.refuses("by its path", read_log, [3])
+        self.refuses("a list of paths, and not by None", run, "map_merge", None)
+        self.refuses("by its path", run, None)
         self.refuses("`topics` are texts", read_log, self.log, topics=[3])
         self.refuses("`topics` are texts", read_log, self.log, topics=3)
 

@@ -4,12 +4,10 @@ import copy
 import os
 import pickle
 import unittest
-import warnings
-from pathlib import Path
 
 import numpy as np
 
-from gridweave import GridweaveError, Map, RequestError, merge, read_log, run, stage
+from gridweave import GridweaveError, Map, merge, read_log, run, stage
 from gridweave.msg.nav_msgs import OccupancyGrid
 
 from test_inputs import A, B, InFolder

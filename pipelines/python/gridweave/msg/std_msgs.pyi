@@ -5,9 +5,6 @@
 from dataclasses import Field
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
 from . import builtin_interfaces
 
 class Bool:
