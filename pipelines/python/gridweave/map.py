@@ -103,7 +103,8 @@ class Map:
             GridweaveError: It cannot be written.
         """
         if not is_yaml(Path(path_of(file))):
-            raise _native.RequestError(f"a map is written as a YAML file, with its image beside it, and not as {file}: give {Path(file).stem or 'map'}.yaml")
+            instead = f"{Path(file).stem or 'map'}.yaml"
+            raise _native.RequestError(f"a map is written as a YAML file, with its image beside it, and not as {file}: give {instead}")
         _native.save_map(file, self.cells, self.resolution, self.origin)
 
     @property

@@ -128,6 +128,11 @@ class ShownTest(InFolder):
         self.assertIn('initial={"robot2": (X, Y, YAW)}', reason)
         self.assertNotIn("--", reason + repr(result) + result.pairs[0].reason)
         self.assertIn("--initial", result.summary["unmerged"]["robot2"])
+        result.summary["unmerged"]["robot2"] = "missing: 0.98 (--set verifier.accept)\ntry: --accept b c=N of these, --initial b c=X,Y,YAW,STDDEV, or tags"
+        self.assertEqual(
+            result.unmerged["robot2"],
+            'missing: 0.98 (parameters={"verifier.accept": ...})\ntry: accept={"b c": N} of these, initial={"b c": (X, Y, YAW, STDDEV)}, or tags',
+        )
 
 
 class PlotTest(unittest.TestCase):
