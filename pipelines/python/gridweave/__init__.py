@@ -16,22 +16,22 @@ from typing import TYPE_CHECKING, Any
 from ._native import GridweaveError, RequestError, __version__
 
 __all__ = [
-    "About", "Context", "Deformation", "Frame", "GridweaveError", "Group", "Input", "LoggedMessage", "Map", "MergeResult", "Output", "Pair",
-    "Parameter", "RequestError", "Stage", "StageStatistics", "__version__", "merge", "read_log", "run", "stage",
+    "About", "Context", "Deformation", "Evidence", "Frame", "GridweaveError", "Group", "Input", "LoggedMessage", "Map", "MergeResult",
+    "Output", "Pair", "Parameter", "RequestError", "Stage", "StageStatistics", "__version__", "merge", "read_log", "run", "stage",
 ]
 
 if TYPE_CHECKING:
     from .log import LoggedMessage, read_log
     from .map import Map
     from .merging import merge
-    from .result import Deformation, Frame, Group, MergeResult, Pair, StageStatistics
+    from .result import Deformation, Evidence, Frame, Group, MergeResult, Pair, StageStatistics
     from .running import run
     from .stages import About, Context, Input, Output, Parameter, Stage, stage
 else:
     #: The module of each name. They are imported when they are used, as the command needs none of them.
     _MODULES = {
         "LoggedMessage": "log", "read_log": "log", "Map": "map", "merge": "merging", "run": "running",
-        "Deformation": "result", "Frame": "result", "Group": "result", "MergeResult": "result", "Pair": "result",
+        "Deformation": "result", "Evidence": "result", "Frame": "result", "Group": "result", "MergeResult": "result", "Pair": "result",
         "StageStatistics": "result",
         "About": "stages", "Context": "stages", "Input": "stages", "Output": "stages", "Parameter": "stages", "Stage": "stages",
         "stage": "stages",

@@ -108,7 +108,9 @@ def _listed(inputs: Any) -> list[Any]:
 
 def _robot(name: Any) -> str:
     if not isinstance(name, str) or not name or re.search(r"[/={}\x00-\x1f\x7f]", name):
-        raise _native.RequestError(f"{name!r} is no name of a robot: that is a text without /, =, {{ and }}, as its topics are /ROBOT/map and others")
+        raise _native.RequestError(
+            f"{name!r} is no name of a robot: that is a text without /, =, {{ and }}, as its topics are /ROBOT/map and others"
+        )
     return name
 
 

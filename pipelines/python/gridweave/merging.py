@@ -1,6 +1,6 @@
 """Merging maps."""
 
-from typing import Any, Iterable, Mapping
+from typing import Any, Iterable, Mapping, Sequence
 
 from numpy.typing import NDArray
 
@@ -16,6 +16,9 @@ def merge(
     reference: str | None = None,
     initial: Initial | None = None,
     accept: Accept | None = None,
+    rename: Mapping[str, str] | None = None,
+    lidar: Mapping[str, Sequence[float]] | None = None,
+    literal_thresholds: bool = False,
     parameters: Mapping[str, Any] | None = None,
     seed: int | None = None,
     output: FilePath | None = None,
@@ -37,6 +40,10 @@ def merge(
             if two more numbers follow, the standard deviations of the position and of the yaw.
         accept: For a robot, the number of the hypothesis to accept, from 1, of the list in the reason why it was not merged; or
             ``"initial"`` to merge its map at its initial pose as it is. ``"robot1/robot2"`` is one pair of robots.
+        rename: Other names of topics of logs, such as ``{"/r1/{robot}/map": "/{robot}/map"}``, where ``{robot}`` is one part of both.
+        lidar: Poses of lidars on their robots, x, y (metres) and yaw (radians), instead of those in the log's tf; behind them the roll of
+            one that is mounted upside down.
+        literal_thresholds: Whether the thresholds of map files are applied literally, even where these leave no walls.
         parameters: Parameters of stages, such as ``{"elastic.enabled": False}``.
         seed: Seed of all random numbers.
         output: A log to write.
@@ -46,5 +53,14 @@ def merge(
         RequestError: The request is wrong, such as a file that is no map.
         GridweaveError: The merge has failed.
     """
-    asked = settings(reference=reference, initial=initial, accept=accept, parameters=parameters, seed=seed)
+    asked = settings(
+        reference=reference,
+        initial=initial,
+        accept=accept,
+        rename=rename,
+        lidar=lidar,
+        literal_thresholds=literal_thresholds,
+        parameters=parameters,
+        seed=seed,
+    )
     return result_of(given(inputs, resolution), asked, output, progress, "merge")

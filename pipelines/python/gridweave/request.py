@@ -6,6 +6,7 @@ import importlib
 import math
 import operator
 import os
+import sys
 from os import PathLike
 from typing import Any, Callable, Iterable, Iterator, Literal, Mapping, Protocol, Sequence
 
@@ -42,6 +43,9 @@ def settings(
     reference: str | None,
     initial: Initial | None = None,
     accept: Accept | None = None,
+    rename: Mapping[str, str] | None = None,
+    lidar: Mapping[str, Sequence[float]] | None = None,
+    literal_thresholds: bool = False,
     parameters: Mapping[str, Any] | None,
     seed: int | None,
 ) -> Callable[[str | None], _native.Request]:
@@ -57,6 +61,9 @@ def settings(
         reference=reference,
         initial=[f"{robot}={_pose(robot, pose)}" for robot, pose in _items("initial", initial, "(x, y, yaw)")],
         accept=[f"{robot}={_hypothesis(robot, number)}" for robot, number in _items("accept", accept, "2")],
+        rename=[f"{old}={_topic(old, new)}" for old, new in _items("rename", rename, '"/NEW"', "/OLD")],
+        lidar=[f"{robot}={_mount(robot, pose)}" for robot, pose in _items("lidar", lidar, "(x, y, yaw)")],
+        literal_thresholds=bool(literal_thresholds),
         settings=[f"{name}={_toml(value)}" for name, value in _items("parameters", parameters, "VALUE", "STAGE.PARAMETER")],
         seed=_seed(seed),
     )
@@ -86,14 +93,37 @@ def _seed(seed: Any) -> int | None:
     return number
 
 
+def _topic(old: str, new: Any) -> str:
+    if "=" in old or not isinstance(new, str):
+        raise _native.RequestError(
+            f"`rename` gives a topic its name, as {{'/r1/{{robot}}/map': '/{{robot}}/map'}}, and not {{{old!r}: {new!r}}}"
+        )
+    return new
+
+
+def _mount(robot: str, pose: Any) -> str:
+    numbers = _numbers(pose)
+    if not 3 <= len(numbers) <= 4:
+        raise _native.RequestError(
+            f"the lidar of `{robot}` is at (x, y, yaw) or (x, y, yaw, roll) on its robot, in metres and radians, and not at {pose!r}"
+        )
+    return ",".join(map(repr, numbers))
+
+
+def _numbers(given: Any) -> list[float]:
+    """Finite numbers; none if something is no sequence of such."""
+    try:
+        numbers = [] if isinstance(given, (str, bytes)) else [float(number) for number in given]
+    except (TypeError, ValueError):
+        numbers = []
+    return numbers if all(map(math.isfinite, numbers)) else []
+
+
 def _pose(robot: str, pose: Any) -> str:
     if all(hasattr(pose, part) for part in ("x", "y", "yaw")):
         pose = (pose.x, pose.y, pose.yaw)
-    try:
-        numbers = [] if isinstance(pose, (str, bytes)) else [float(number) for number in pose]
-    except (TypeError, ValueError):
-        numbers = []
-    if not 3 <= len(numbers) <= 5 or not all(map(math.isfinite, numbers)):
+    numbers = _numbers(pose)
+    if not 3 <= len(numbers) <= 5:
         raise _native.RequestError(
             f"the initial pose of `{robot}` is a Frame or (x, y, yaw) in numbers, with the standard deviations of the position and of the "
             f"yaw behind them if they are known, and not {pose!r}"
@@ -114,6 +144,12 @@ def _hypothesis(robot: str, number: Any) -> str:
             f"is, and not {number!r}"
         )
     return str(index)
+
+
+def use_this_interpreter() -> None:
+    """Makes this interpreter, which has the package, that of stages in Python, unless ``GRIDWEAVE_PYTHON`` names another."""
+    if sys.executable:
+        os.environ.setdefault("GRIDWEAVE_PYTHON", sys.executable)
 
 
 def path_of(file: Any) -> str:

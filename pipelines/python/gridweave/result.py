@@ -51,6 +51,25 @@ class Frame:
 
 
 @dataclass(frozen=True)
+class Evidence:
+    """The agreement of the maps of a pair of robots.
+
+    Attributes:
+        hypotheses: The number of hypotheses that were judged.
+        overlap_m2: The area that is known in both maps, square metres.
+        wall_on_wall_m: Walls of one map on walls of the other, metres.
+        wall_on_free_m: Walls of one map on free space of the other, metres.
+        elsewhere: The evidence for the second-best hypothesis, as a share of that for this one.
+    """
+
+    hypotheses: int
+    overlap_m2: float
+    wall_on_wall_m: float
+    wall_on_free_m: float
+    elsewhere: float
+
+
+@dataclass(frozen=True)
 class Pair:
     """The outcome of a pair of robots: the transform from the map of ``b`` to that of ``a``.
 
@@ -63,8 +82,9 @@ class Pair:
         yaw: Radians.
         probability: The probability that the transform is right, 0 to 1.
         accepted: Whether it was merged.
-        checked: Whether the maps were compared at it.
+        checked: Whether transforms of other pairs, one after the other, confirm it.
         reason: Why it was accepted or refused: a sentence, and behind an empty line the evidence term by term.
+        evidence: The agreement of the maps; None if they were not compared.
     """
 
     a: str
@@ -77,6 +97,7 @@ class Pair:
     accepted: bool
     checked: bool
     reason: str
+    evidence: Evidence | None
 
 
 @dataclass(frozen=True)
@@ -185,8 +206,7 @@ class MergeResult:
     @cached_property
     def pairs(self) -> list[Pair]:
         """The outcome of each pair of robots."""
-        pairs = (dict(pair) for pair in self.summary.get("alignments", []))
-        return [Pair(probability=pair.pop("score"), reason=_in_python(pair.pop("reason")), **pair) for pair in pairs]
+        return [_pair(**pair) for pair in self.summary.get("alignments", [])]
 
     @cached_property
     def deformations(self) -> dict[str, Deformation]:
@@ -325,6 +345,11 @@ class MergeResult:
         return f'<img src="data:image/png;base64,{base64.b64encode(picture.getvalue()).decode()}">'
 
 
+def _pair(*, score: float, reason: str, evidence: dict[str, Any] | None = None, **same: Any) -> Pair:
+    agreement = None if evidence is None else Evidence(**evidence)
+    return Pair(probability=score, reason=_in_python(reason), evidence=agreement, **same)
+
+
 def _frames(frames: dict[str, Any]) -> dict[str, Frame]:
     return {
         robot: Frame(frame["x"], frame["y"], frame["yaw"], np.array(frame["covariance"]).reshape(3, 3))
@@ -363,7 +388,8 @@ def _in_python(reason: str) -> str:
     """A reason with the arguments of Python in place of the options of the command."""
     reason = re.sub(r"--(initial|accept) (.+?)=(X,Y,YAW(?:,STDDEV)?|N\b)", _argument, reason)
     reason = re.sub(r"--set ([\w.]+\w)", r'parameters={"\1": ...}', reason)
-    return re.sub(r"--(accept|initial|reference)\b", r"`\1=`", reason)
+    options = r"--(accept|initial|lidar|literal-thresholds|reference|rename)\b"
+    return re.sub(options, lambda option: f"`{option[1].replace('-', '_')}=`", reason)
 
 
 def _argument(option: "re.Match[str]") -> str:

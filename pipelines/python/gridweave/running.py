@@ -3,12 +3,12 @@
 import functools
 import json
 import os
-from typing import Any, Callable, Iterable, Mapping
+from typing import Any, Callable, Iterable, Mapping, Sequence
 
 from . import _native
 from .in_process import InProcess
 from .inputs import of_files
-from .request import FilePath, Progress, path_of, paths_of, settings
+from .request import Accept, FilePath, Initial, Progress, path_of, paths_of, settings, use_this_interpreter
 from .result import MergeResult, result_of
 from .stages import Stage
 
@@ -20,6 +20,11 @@ def run(
     output: FilePath | None = None,
     stages: Mapping[str, type[Stage] | Callable[..., Any]] | None = None,
     reference: str | None = None,
+    initial: Initial | None = None,
+    accept: Accept | None = None,
+    rename: Mapping[str, str] | None = None,
+    lidar: Mapping[str, Sequence[float]] | None = None,
+    literal_thresholds: bool = False,
     parameters: Mapping[str, Any] | None = None,
     seed: int | None = None,
     progress: Progress = False,
@@ -38,6 +43,7 @@ def run(
         RequestError: The pipeline or the request is wrong.
         GridweaveError: A stage has failed. Its cause (``__cause__``) is the exception of a stage of one's own.
     """
+    use_this_interpreter()
     listed = paths_of(inputs)
     named = path_of(pipeline)
     # A shipped pipeline has no file.
@@ -54,7 +60,16 @@ def run(
                 raise error from raised[0]
             raise
 
-    asked = settings(reference=reference, parameters=parameters, seed=seed)
+    asked = settings(
+        reference=reference,
+        initial=initial,
+        accept=accept,
+        rename=rename,
+        lidar=lidar,
+        literal_thresholds=literal_thresholds,
+        parameters=parameters,
+        seed=seed,
+    )
     return result_of(of_files(listed, start), asked, output, progress, "run")
 
 

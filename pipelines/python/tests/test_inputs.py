@@ -217,5 +217,25 @@ class TopicsTest(InFolder):
         self.refuses("`topics` are texts", read_log, self.log, topics=3)
 
 
+class NamesTest(InFolder):
+    def test_topics_of_logs_get_other_names(self):
+        self.make_log()
+        result = merge(self.log, rename={"/a/map": "/attic/map"})
+        self.assertEqual(sorted(result.frames), ["attic", "b"])
+        self.refuses("`rename` gives a topic its name", merge, self.log, rename={"/a/map": None})
+        self.refuses("`rename` is a mapping", merge, self.log, rename=["/a/map=/attic/map"])
+
+    def test_the_place_of_a_lidar_is_numbers_and_of_logs(self):
+        self.refuses("the lidar of `a` is at \\(x, y, yaw\\)", merge, self.log, lidar={"a": (0.1, 0.0)})
+        self.refuses("lidar is for logs", merge, [self.a, self.b], lidar={"a": (0.1, 0.0, 0.0)})
+
+    def test_thresholds_of_files_are_taken_literally_if_asked(self):
+        self.assertTrue(merge([self.a, self.b], literal_thresholds=True).is_complete)
+
+    def test_a_pair_has_its_evidence_in_numbers(self):
+        (pair,) = merge([self.a, self.b]).pairs
+        self.assertGreater(pair.evidence.wall_on_wall_m, 20)
+        self.assertLess(pair.evidence.wall_on_free_m, 1)
+
 if __name__ == "__main__":
     unittest.main()

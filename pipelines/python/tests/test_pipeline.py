@@ -1,8 +1,10 @@
 """Running pipelines with stages in this process."""
 
+import os
 import tempfile
 import unittest
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 
@@ -55,6 +57,19 @@ class PipelineTest(unittest.TestCase):
         self.assertEqual(grid.data.tolist(), [0, 70, -1, 0])
         self.assertEqual(result.stages["own"].messages_out, 1)
         self.assertEqual(result.frames, {})
+
+    def test_a_stage_in_a_process_of_its_own_runs_in_this_interpreter(self):
+        text = PIPELINE.replace('kind = "own"', f'kind = "python"\nmodule = "{EXAMPLES / "invert.py"}"')
+        (self.path / "process.toml").write_text(text)
+        with mock.patch.dict(os.environ, {"PATH": "/nonexistent"}):
+            os.environ.pop("GRIDWEAVE_PYTHON", None)
+            run(self.path / "process.toml", [self.path / "a.yaml"], output=self.path / "out.mcap")
+        (grid,) = self.messages()
+        self.assertEqual(grid.data.tolist(), [100, 0, -1, 100])
+
+    def test_a_stage_that_the_pipeline_does_not_have_is_refused(self):
+        with self.assertRaisesRegex(RequestError, "no stage of the kind `other`"):
+            run(self.path / "own.toml", [self.path / "a.yaml"], stages={"own": raised, "other": raised})
 
     def test_a_class_has_what_it_has_in_a_process_of_its_own(self):
         seen = []
