@@ -75,9 +75,15 @@ def given(inputs: Any, resolution: float | None) -> Given:
 
 
 def of_files(typed: list[str], run: Callable[..., tuple[str, Any]]) -> Given:
-    """Files, each as PATH or ROBOT=PATH, with what runs on them."""
+    """Files, each as PATH or ROBOT=PATH, with what runs on them.
+
+    Raises:
+        RequestError: One is not there.
+    """
     folder = os.getcwd()
     parts = [_parts(one) for one in typed]
+    if missing := [path for _, path in parts if not path.exists()]:
+        raise _native.RequestError(f"there is no file {missing[0]}")
     absolute = [str(path.absolute()) if robot is None else f"{robot}={path.absolute()}" for robot, path in parts]
 
     def on_files(asked: _native.Request, report: Callable[[float], Any] | None) -> tuple[str, Any]:

@@ -52,7 +52,7 @@ class Map:
 
         Raises:
             RequestError: It is the image alone.
-            GridweaveError: It cannot be read.
+            RequestError: It cannot be read, or is no map.
         """
         if is_image(Path(path_of(file))):
             raise _native.RequestError(f"{file} is an image: give the YAML file of the map instead, which says how large its cells are")

@@ -43,7 +43,7 @@ pub(crate) fn into_array(py: Python<'_>, map: GridMap) -> PyResult<Grid<'_>> {
 #[pyfunction]
 pub(crate) fn load_map(py: Python<'_>, file: PathBuf) -> PyResult<(Grid<'_>, Option<String>)> {
     let loaded = py.detach(|| map_file::load_as(&file, Thresholds::ByPicture));
-    let (map, warning) = loaded.map_err(|error| GridweaveError::new_err(error.to_string()))?;
+    let (map, warning) = loaded.map_err(|error| RequestError::new_err(error.to_string()))?;
     Ok((into_array(py, map)?, warning.map(|warning| warning.to_string())))
 }
 

@@ -217,6 +217,15 @@ class TopicsTest(InFolder):
         self.refuses("`topics` are texts", read_log, self.log, topics=3)
 
 
+class MissingTest(InFolder):
+    def test_files_that_are_not_there_or_are_no_maps_are_refused(self):
+        self.refuses("there is no file .*nope.yaml", merge, [self.a, self.path / "nope.yaml"])
+        self.refuses("there is no file .*nope.mcap", run, "map_merge", [self.path / "nope.mcap"])
+        self.refuses("nope.yaml", Map.load, self.path / "nope.yaml")
+        (self.path / "no_map.yaml").write_text("image: 5")
+        self.refuses("no_map.yaml", Map.load, self.path / "no_map.yaml")
+
+
 class NamesTest(InFolder):
     def test_topics_of_logs_get_other_names(self):
         self.make_log()
