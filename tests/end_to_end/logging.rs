@@ -1,6 +1,6 @@
 //! Suggestions, log lines, traces, completions and manual pages of the command.
 
-use crate::support::{SMALL_BUILDING, gridweave, simulate};
+use crate::support::{SMALL_BUILDING, gridweave, gridweave_program, simulate};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
@@ -103,6 +103,8 @@ fn completions_and_manual_pages_cover_every_command() {
         gridweave(folder.path(), &["shell", "completions", shell]).assert(0, &["merge", "--summary"]);
     }
     gridweave(folder.path(), &["shell", "man", "man1"]).assert(0, &[]);
-    let page = fs::read_to_string(folder.path().join("man1/gridweave-merge.1")).unwrap();
+    // They are of the program that writes them.
+    let program = gridweave_program().file_name().unwrap().to_string_lossy();
+    let page = fs::read_to_string(folder.path().join(format!("man1/{program}-merge.1"))).unwrap();
     assert!(page.contains("map_server"), "{page}");
 }

@@ -51,8 +51,7 @@ class Map:
         """Reads a map file: the YAML of nav2's map server, with its image.
 
         Raises:
-            RequestError: It is the image alone.
-            RequestError: It cannot be read, or is no map.
+            RequestError: It cannot be read, is no map, or is the image alone.
         """
         if is_image(Path(path_of(file))):
             raise _native.RequestError(f"{file} is an image: give the YAML file of the map instead, which says how large its cells are")
