@@ -7,6 +7,11 @@ use std::fmt;
 pub(crate) struct Prefix(pub(crate) [u8; 12]);
 
 impl Prefix {
+    /// Whether it is of a participant of this vendor (RTPS 2.3, 9.3.1.5).
+    pub(crate) fn is_of(self, vendor: [u8; 2]) -> bool {
+        self.0.starts_with(&vendor)
+    }
+
     /// Stands for all participants.
     pub(crate) const UNKNOWN: Self = Self([0; 12]);
 }

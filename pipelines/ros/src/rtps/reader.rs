@@ -19,6 +19,8 @@ const LONGEST_QUESTION: Duration = Duration::from_secs(5);
 /// The heartbeats of some writers are seconds apart.
 const STALL: Duration = Duration::from_millis(20);
 const LONGEST_STALL: Duration = Duration::from_secs(1);
+/// The vendor of Fast DDS, as the identifiers of its participants begin.
+const FAST_DDS: [u8; 2] = [1, 15];
 /// So many samples wait for those before them. Further ones are asked for again.
 const HELD_SAMPLES: usize = 1024;
 /// So many samples are put together at a time.
@@ -256,11 +258,13 @@ impl MatchedWriter {
         samples
     }
 
-    /// What asks a writer what it has. The specification lets it begin with the number 1; Fast DDS answers at once if
-    /// it begins with 0, and with 1 when its next heartbeat is due, after three seconds. So both are asked in turn.
+    /// What asks a writer what it has: numbers begin with 1 (RTPS 2.3, 8.3.5.5), and Cyclone DDS rejects what begins
+    /// with 0. Fast DDS answers at once if it begins with 0, and with 1 when its next heartbeat is due, after three
+    /// seconds. So it is asked both in turn.
     fn ask(&mut self, own: Guid, writer: Guid) -> Outgoing {
         self.requests = self.requests.wrapping_add(1);
-        let nothing = NumberSet::new(i64::from(self.requests.is_multiple_of(2)), []);
+        let begins_with_zero = writer.prefix.is_of(FAST_DDS) && !self.requests.is_multiple_of(2);
+        let nothing = NumberSet::new(i64::from(!begins_with_zero), []);
         let message = Message::new(own.prefix).to(writer.prefix);
         let message = message.acknack(own.entity, writer.entity, &nothing, self.requests, false);
         Outgoing { to: self.addresses.clone(), content: Content::Message(message) }
@@ -285,5 +289,44 @@ impl MatchedWriter {
             message = message.nack_fragments(reader, from, sequence, &fragments, self.requests);
         }
         Outgoing { to: self.addresses.clone(), content: Content::Message(message) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::guid::EntityId;
+    use super::super::submessage::submessages;
+    use super::*;
+    use std::net::Ipv4Addr;
+
+    /// Where the first questions to a writer begin that says nothing.
+    fn questions_begin_with(vendor: [u8; 2]) -> Vec<i64> {
+        let of = |prefix, entity| Guid { prefix, entity };
+        let mut prefix = [7; 12];
+        prefix[..2].copy_from_slice(&vendor);
+        let mut reader = Reader::new(of(Prefix([1; 12]), EntityId::reader(1)), true);
+        let mut now = Instant::now();
+        let address = SocketAddrV4::new(Ipv4Addr::LOCALHOST, 7411);
+        reader.add_writer(of(Prefix(prefix), EntityId::writer(1)), vec![address], [true, true], now);
+        let mut begins = Vec::new();
+        for _ in 0..4 {
+            now += LONGEST_QUESTION;
+            for outgoing in reader.tick(now) {
+                let Content::Message(message) = outgoing.content else { continue };
+                for part in submessages(&message.into_bytes()) {
+                    let Body::AckNack { missing, is_final, .. } = part.body else { continue };
+                    assert!(missing.numbers.is_empty() && !is_final);
+                    begins.push(missing.base);
+                }
+            }
+        }
+        begins
+    }
+
+    #[test]
+    fn a_question_begins_with_one_and_for_fast_dds_with_zero_in_turn() {
+        assert_eq!(questions_begin_with([1, 16]), [1; 4]);
+        assert_eq!(questions_begin_with([0, 0]), [1; 4]);
+        assert_eq!(questions_begin_with(FAST_DDS), [0, 1, 0, 1]);
     }
 }
