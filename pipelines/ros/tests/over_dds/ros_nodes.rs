@@ -4,13 +4,18 @@
 
 use crate::command::{GRIDWEAVE, Running, run};
 use crate::domain::{Domain, give, go_on, map, sent, warned};
+use gridweave_logs::schemas::schema_names;
 use gridweave_ros::key_expression::known_hash;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, PoseStamped, RosMessage, encode};
-use std::collections::BTreeSet;
-use std::io::{BufRead, BufReader};
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+
+/// The packages whose types must all be there.
+const PACKAGES: [&str; 6] =
+    ["builtin_interfaces", "geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs", "visualization_msgs"];
 
 pub(crate) fn script(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(name)
@@ -235,36 +240,50 @@ fn is_equal_in_32_bits(a: Option<f64>, b: Option<f64>) -> bool {
 fn hashes_of_types_are_those_of_the_packages() {
     let python = std::env::var("GRIDWEAVE_ROS_PYTHON").expect("GRIDWEAVE_ROS_PYTHON names a Python with rclpy");
     let share = Path::new(&python).parent().unwrap().join("../share");
-    let compared = compare_hashes(&share);
-    for package in ["geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs", "visualization_msgs"] {
-        assert!(compared.iter().any(|name| name.starts_with(package)), "{package}: {compared:?}");
-    }
+    let compared = compare_hashes(&share, &PACKAGES);
+    assert!(compared.len() > PACKAGES.len(), "{compared:?}");
 }
 
 /// Compares the hashes that packages in a folder state with those of the types that are known here, and gives the names
-/// of these.
+/// of these. Which types no package there has is printed; of `needed` packages each type must be there.
 #[track_caller]
-pub(crate) fn compare_hashes(share: &Path) -> BTreeSet<String> {
-    let mut compared = BTreeSet::new();
+pub(crate) fn compare_hashes(share: &Path, needed: &[&str]) -> BTreeSet<String> {
+    let stated = stated_hashes(share);
+    let (mut compared, mut skipped) = (BTreeSet::new(), BTreeSet::new());
+    // The built-in definition is that of logs before Iron; `ros_source` knows both.
+    for name in schema_names().filter(|name| name != "sensor_msgs/msg/Range") {
+        match stated.get(&name) {
+            Some(stated) => {
+                assert_eq!(known_hash(&name).as_ref(), Some(stated), "{name}");
+                compared.insert(name);
+            }
+            None => _ = skipped.insert(name),
+        }
+    }
+    writeln!(std::io::stderr(), "in no package in {}: {skipped:?}", share.display()).unwrap();
+    for package in needed {
+        let is_of = |name: &&String| name.split('/').next() == Some(*package);
+        assert!(compared.iter().any(|name| is_of(&name)), "{package}: {compared:?}");
+        assert_eq!(skipped.iter().find(is_of), None, "{package} lacks a type that is known here");
+    }
+    compared
+}
+
+/// The hashes of types that packages in a folder state.
+fn stated_hashes(share: &Path) -> BTreeMap<String, String> {
+    let mut hashes = BTreeMap::new();
     for package in std::fs::read_dir(share).unwrap() {
         let Ok(types) = std::fs::read_dir(package.unwrap().path().join("msg")) else { continue };
         let files =
             types.map(|file| file.unwrap().path()).filter(|path| path.extension().is_some_and(|end| end == "json"));
         for file in files {
             let stated: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap();
-            for stated in stated["type_hashes"].as_array().unwrap() {
-                let name = stated["type_name"].as_str().unwrap();
-                // The built-in definition is that of logs before Iron; `ros_source` knows both.
-                if name == "sensor_msgs/msg/Range" {
-                    continue;
-                }
-                let Some(hash) = known_hash(name) else { continue };
-                assert_eq!(hash, stated["hash_string"].as_str().unwrap(), "{name}");
-                compared.insert(name.to_owned());
-            }
+            let text = |value: &serde_json::Value| value.as_str().unwrap().to_owned();
+            let of_file = stated["type_hashes"].as_array().unwrap().iter();
+            hashes.extend(of_file.map(|stated| (text(&stated["type_name"]), text(&stated["hash_string"]))));
         }
     }
-    compared
+    hashes
 }
 
 /// Publishes until there is a warning.
