@@ -3,6 +3,7 @@
 use gridweave_runtime::pipeline::{Overrides, Pipeline, PipelineErrors, suggest};
 use gridweave_runtime::stage::{Registry, StageKind};
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// Makes the registry of the stage kinds of Gridweave and the given ones; of two kinds with one name the given one
 /// counts.
@@ -54,15 +55,32 @@ pub const PIPELINES: &[Shipped] = &[
     shipped!("topology_file_merge", "merge topological maps that were drawn by hand (JSON)"),
 ];
 
+/// The pipelines that a program with other stages ships beside these.
+static FURTHER: OnceLock<&'static [Shipped]> = OnceLock::new();
+
+/// Ships the pipelines of a program with other stages, too. The first call counts.
+pub fn ship(pipelines: &'static [Shipped]) {
+    FURTHER.get_or_init(|| pipelines);
+}
+
+/// All shipped pipelines, by name.
+pub fn all() -> Vec<&'static Shipped> {
+    let further = FURTHER.get().copied().unwrap_or_default();
+    let mut all: Vec<&Shipped> = PIPELINES.iter().chain(further).collect();
+    all.sort_by_key(|shipped| shipped.name);
+    all
+}
+
 /// Finds a shipped pipeline by name.
 ///
 /// # Errors
 /// There is none; the text suggests a similar name.
 pub fn find(name: &str) -> Result<&'static Shipped, String> {
-    let names: Vec<&str> = PIPELINES.iter().map(|shipped| shipped.name).collect();
+    let all = all();
+    let names: Vec<&str> = all.iter().map(|shipped| shipped.name).collect();
     let meant = || suggest(name, &names, "there are").unwrap_or_default();
-    let found = PIPELINES.iter().find(|shipped| shipped.name == name);
-    found.ok_or_else(|| format!("no shipped pipeline `{name}`: {}", meant()))
+    let found = all.iter().find(|shipped| shipped.name == name);
+    found.copied().ok_or_else(|| format!("no shipped pipeline `{name}`: {}", meant()))
 }
 
 /// Loads a pipeline file, or the shipped pipeline of that name.
@@ -92,6 +110,14 @@ fn is_name(text: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pipelines_of_a_program_are_found_beside_the_others() {
+        assert!(find("of_a_program").is_err_and(|error| error.contains("no shipped pipeline")));
+        ship(&[Shipped { name: "of_a_program", what: "", text: "a" }]);
+        assert_eq!(find("of_a_program").map(|shipped| shipped.text), Ok("a"));
+        assert!(find("tag_merge").is_ok() && all().is_sorted_by_key(|shipped| shipped.name));
+    }
 
     #[test]
     fn every_parameter_of_every_kind_can_be_set_in_a_pipeline() {

@@ -6,6 +6,7 @@
 //!
 //! ```no_run
 //! fn main() -> std::process::ExitCode {
+//!     gridweave::shipped::ship(gridweave_ros::PIPELINES);
 //!     gridweave::command_with(gridweave_ros::kinds(), &[gridweave_ros::doctor()], gridweave_bridge::on_log_warning)
 //! }
 //! ```
@@ -44,7 +45,22 @@ mod source_parameters;
 mod zenoh_node;
 
 pub use doctor::doctor;
+use gridweave::shipped::Shipped;
 use gridweave_runtime::stage::StageKind;
+
+/// The pipelines that ship with these kinds.
+pub const PIPELINES: &[Shipped] = &[
+    Shipped {
+        name: "live_ros",
+        what: "merge the maps of robots that run ROS 2 while they explore, and publish the merged map there",
+        text: include_str!("../live_ros.toml"),
+    },
+    Shipped {
+        name: "live_ros_scans",
+        what: "the same, where some robots publish scans of their lidars and no map",
+        text: include_str!("../live_ros_scans.toml"),
+    },
+];
 
 /// The stage kinds for ROS 2 and of the bridge between machines.
 pub fn kinds() -> Vec<StageKind> {

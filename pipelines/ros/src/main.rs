@@ -13,5 +13,6 @@ fn main() -> ExitCode {
         let _ = writeln!(std::io::stderr(), "error: {}", escape(&advice));
         return ExitCode::from(2);
     }
+    gridweave::shipped::ship(gridweave_ros::PIPELINES);
     gridweave::command_with(gridweave_ros::kinds(), &[gridweave_ros::doctor()], gridweave_bridge::on_log_warning)
 }

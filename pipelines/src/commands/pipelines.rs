@@ -20,7 +20,7 @@ pub(crate) fn pipelines(args: &PipelinesArgs) -> Result<Status> {
         Some(name) => print(shipped::find(name).map_err(BadUse)?.text)?,
         None => {
             let mut table = Table::new(["pipeline", "what it does"]);
-            shipped::PIPELINES.iter().for_each(|shipped| table.row([shipped.name, shipped.what].map(str::to_owned)));
+            shipped::all().into_iter().for_each(|shipped| table.row([shipped.name, shipped.what].map(str::to_owned)));
             print(table.fit(width()))?
         }
     };
