@@ -4,12 +4,14 @@
 use std::fmt::Write;
 use std::iter::Peekable;
 
-/// The stages of `live_ros.toml` that take what robots publish, and that publish.
+/// The stages of `live_ros` that take what robots publish, and that publish.
 const SOURCE: &str = "robots";
 const SINK: &str = "ros";
 /// What is published there, as topics begin.
 const PUBLISHED: [&str; 7] =
     ["/map", "/map_updates", "/map_conflicts", "/robot_frames", "/tf", "/tf_static", "/markers"];
+/// Those of them that a namespace is for.
+const IN_A_NAMESPACE: [&str; 3] = ["/map", "/map_conflicts", "/robot_frames"];
 /// The parameters that both have.
 const OF_BOTH: [&str; 7] =
     ["connect", "discovery_range", "domain", "listen", "middleware", "static_peers", "zenoh_config"];
@@ -38,7 +40,7 @@ pub fn advice(arguments: &[String]) -> Option<String> {
         let file = launch_file.map_or("FILE", String::as_str);
         return Some(format!(
             "launch files are started by ROS: ros2 launch {file}\n\
-             In one, ExecuteProcess(cmd=[\"gridweave-ros\", \"run\", \"live_ros.toml\"]) starts a merge"
+             In one, ExecuteProcess(cmd=[\"gridweave-ros\", \"run\", \"live_ros\"]) starts a merge"
         ));
     }
     // Other verbs take files, which may have any name.
@@ -97,7 +99,14 @@ impl Instead {
         let from = from.rsplit_once(':').map_or(from, |(_, from)| from);
         match from {
             "__node" | "__name" => self.arguments.push(format!("--set {SINK}.node={to}")),
-            "__ns" => self.renamed.push(format!("/map={}/map", absolute(to).trim_end_matches('/'))),
+            "__ns" => {
+                let namespace = absolute(to);
+                let of = |topic: &str| format!("{topic}={}{topic}", namespace.trim_end_matches('/'));
+                self.renamed.extend(IN_A_NAMESPACE.into_iter().map(of));
+                self.notes.push(
+                    "markers and paths of robots keep their names, and so do /tf and /tf_static, as in ROS".to_owned(),
+                );
+            }
             from => {
                 let (from, to) = (absolute(from), absolute(to));
                 let is_published = PUBLISHED.iter().any(|topic| *topic == from)
@@ -115,6 +124,10 @@ impl Instead {
 
     /// `-p NAME:=VALUE`, or for one node alone `-p NODE:NAME:=VALUE`.
     fn set(&mut self, name: &str, value: &str) {
+        // Without `-r` a remapping looks like a parameter, whose name has no slash.
+        if name.contains('/') || name.starts_with("__") {
+            return self.remap(name, value);
+        }
         let name = name.rsplit_once(':').map_or(name, |(_, name)| name);
         if name == "use_sim_time" {
             self.notes.push("use_sim_time is left out: the stamps of robots are taken as they are".to_owned());
@@ -158,9 +171,7 @@ impl Instead {
                 "; parameters are --set STAGE.PARAMETER=VALUE, and published topics --set ros.rename='[\"/OLD=/NEW\"]'",
             ),
             // Writing to a text does not fail.
-            false => {
-                _ = write!(text, "; for the stages of live_ros.toml write instead\n    {}", self.arguments.join(" "))
-            }
+            false => _ = write!(text, "; for the stages of live_ros write instead\n    {}", self.arguments.join(" ")),
         }
         self.notes.dedup();
         if !self.notes.is_empty() {
@@ -193,7 +204,13 @@ mod tests {
                 "'[\"/map=/fleet\", \"/tf_static=/f/tf_static\"]'",
             ),
             ("run a.toml --ros-args --remap __node:=merger", "--set ros.node=merger"),
-            ("run a.toml --ros-args -r __ns:=/fleet", "[\"/map=/fleet/map\"]"),
+            (
+                "run a.toml --ros-args -r __ns:=/fleet",
+                "'[\"/map=/fleet/map\", \"/map_conflicts=/fleet/map_conflicts\", \"/robot_frames=/fleet/robot_frames\"]'\nmarkers",
+            ),
+            ("run a.toml /map:=/fleet/map", "\n    --set ros.rename='[\"/map=/fleet/map\"]'"),
+            ("run a.toml __node:=merger", "--set ros.node=merger"),
+            ("run a.toml -p n:/map:=/a", "[\"/map=/a\"]"),
             (
                 "run a.toml --ros-args -p domain:=5 -p use_sim_time:=true",
                 "--set robots.domain=5 --set ros.domain=5\nuse_sim_time",
