@@ -2,7 +2,9 @@
 
 use super::dds_node::DdsNode;
 use super::discovery_range::{DiscoveryRange, static_peers};
-use super::middleware::Middlewares;
+use super::middleware::{Middleware, Middlewares};
+use super::own_name::OwnName;
+use super::rtps::LAST_DOMAIN;
 use gridweave_bridge::zenoh_session::{file_config, join, peer_config};
 use gridweave_runtime::stage::{ParameterError, StageError};
 use std::path::PathBuf;
@@ -38,6 +40,18 @@ impl Connection {
             name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') && name.chars().all(is_part)
         };
         let mut errors = Vec::new();
+        match self.domain() {
+            // Stages fail with the same, and where they start again, again and again.
+            Err(error) => errors.push(ParameterError::new("domain", format!("cannot be found: {error}"))),
+            Ok(domain) if domain > LAST_DOMAIN && self.middleware.has(Middleware::Dds) => {
+                let of = if self.domain.is_none() { format!(", of {DOMAIN_VARIABLE},") } else { String::new() };
+                errors.push(ParameterError::new(
+                    "domain",
+                    format!("{domain}{of} is none of DDS, whose domains end at {LAST_DOMAIN}; `middleware = \"zenoh\"` has others"),
+                ));
+            }
+            Ok(_) => {}
+        }
         if self.node.as_ref().is_some_and(|node| !is_named(node)) {
             errors.push(ParameterError::new("node", "must be letters, digits and underscores, as ROS asks of it"));
         }
@@ -58,21 +72,14 @@ impl Connection {
     /// # Errors
     /// The environment says something that is no number.
     pub(crate) fn domain(&self) -> Result<u32, StageError> {
-        match (self.domain, std::env::var(DOMAIN_VARIABLE)) {
-            (Some(domain), _) => Ok(domain),
-            (None, Ok(text)) if !text.is_empty() => text.trim().parse().map_err(|_| {
-                StageError::new("find the ROS domain", format!("{DOMAIN_VARIABLE} is `{text}`"))
-                    .with_help("it must be a whole number; `domain` in the pipeline stands in for it")
-            }),
-            _ => Ok(0),
-        }
+        domain_of(self.domain, &std::env::var(DOMAIN_VARIABLE).unwrap_or_default())
     }
 
     /// Joins a domain on DDS.
     ///
     /// # Errors
     /// The environment wants nobody to be found, or the system refuses the sockets.
-    pub(crate) fn join_dds(&self, domain: u32, node: &str) -> Result<DdsNode, StageError> {
+    pub(crate) fn join_dds(&self, domain: u32, name: &OwnName) -> Result<DdsNode, StageError> {
         let range = match self.discovery_range {
             Some(range) => Some(range),
             None => DiscoveryRange::of_environment()?,
@@ -81,7 +88,7 @@ impl Connection {
             StageError::new("join the DDS network", "ROS_AUTOMATIC_DISCOVERY_RANGE is OFF")
                 .with_help("SUBNET and LOCALHOST are others; `discovery_range` in the pipeline stands in for it")
         })?;
-        DdsNode::start(domain, node, range.reach(), &static_peers(&self.static_peers))
+        DdsNode::start(domain, name, range.reach(), &static_peers(&self.static_peers))
     }
 
     /// Opens a session.
@@ -111,6 +118,50 @@ impl Connection {
         match self.connect.is_empty() {
             true => "anywhere".to_owned(),
             false => self.connect.join(" or "),
+        }
+    }
+}
+
+/// The domain that is given or, if none is, that of the environment.
+fn domain_of(given: Option<u32>, of_environment: &str) -> Result<u32, StageError> {
+    match (given, of_environment.trim()) {
+        (Some(domain), _) => Ok(domain),
+        (None, "") => Ok(0),
+        (None, text) => text.parse().map_err(|_| {
+            StageError::new("find the ROS domain", format!("{DOMAIN_VARIABLE} is `{text}`"))
+                .with_help("it must be a whole number; `domain` in the pipeline stands in for it")
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::source_parameters::SourceParameters;
+    use super::*;
+
+    fn wrong(domain: Option<u32>, middleware: Middlewares) -> Vec<String> {
+        let connection = Connection { domain, middleware, ..SourceParameters::default().connection() };
+        connection.check().iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn a_domain_that_dds_does_not_have_is_wrong_unless_it_is_one_of_zenoh() {
+        let told = wrong(Some(233), Middlewares::Auto);
+        assert!(told.len() == 1 && told[0].contains("end at 232"), "{told:?}");
+        assert_eq!(
+            (wrong(Some(232), Middlewares::Dds), wrong(Some(300), Middlewares::Zenoh)),
+            (Vec::new(), Vec::new())
+        );
+    }
+
+    #[test]
+    fn the_domain_of_the_environment_is_a_whole_number() {
+        assert_eq!(
+            [domain_of(None, "").ok(), domain_of(None, " 5 ").ok(), domain_of(Some(7), "abc").ok()],
+            [Some(0), Some(5), Some(7)]
+        );
+        for text in ["abc", "-1", "1.5"] {
+            assert!(domain_of(None, text).is_err_and(|error| error.to_string().contains(text)), "{text}");
         }
     }
 }

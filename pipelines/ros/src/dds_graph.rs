@@ -16,6 +16,12 @@ pub(crate) const NAMES_TOPIC: &str = "ros_discovery_info";
 pub(crate) const TOPIC_PREFIX: &str = "rt";
 /// So long the name of an endpoint's node is waited for.
 const PATIENCE: Duration = Duration::from_secs(1);
+/// So long a mismatch may last before it is reported: who subscribes here may subscribe again with what all offer, once
+/// it is known whose the endpoint is.
+const MISMATCH_PATIENCE: Duration = Duration::from_secs(2);
+
+/// So many digits of a type's hash are shown.
+const HASH_DIGITS: usize = 8;
 
 /// Called with an entity that is there, or is no more.
 type OnEntity = Box<dyn Fn(Entity, bool) + Send + Sync>;
@@ -65,6 +71,11 @@ impl Graph {
         std::mem::take(&mut *lock(&self.problems))
     }
 
+    /// An endpoint here is no more, and what it did not match does not count.
+    pub(crate) fn forget(&self, here: Guid) {
+        lock(&self.seen).mismatches.retain(|(_, mismatch)| mismatch.here.guid != here);
+    }
+
     /// Takes up what a participant says of its nodes.
     pub(crate) fn note_names(&self, message: &[u8]) {
         let mut seen = lock(&self.seen);
@@ -92,10 +103,9 @@ impl Graph {
         });
         let mut problems = Vec::new();
         mismatches.retain(|(since, mismatch)| {
-            let guid = &mismatch.there.guid;
-            let is_ready = is_ready(*since, guid);
+            let is_ready = now.duration_since(*since) >= MISMATCH_PATIENCE;
             if is_ready {
-                problems.push(problem(mismatch, names.get(guid)));
+                problems.push(problem(mismatch, names.get(&mismatch.there.guid)));
             }
             !is_ready
         });
@@ -133,6 +143,7 @@ impl Watch for Arc<Graph> {
             return;
         }
         seen.nameless.remove(&guid);
+        seen.mismatches.retain(|(_, mismatch)| mismatch.there.guid != guid);
         seen.names.remove(&guid);
         let gone = seen.entities.remove(&guid);
         drop(seen);
@@ -169,6 +180,7 @@ fn entity(domain: u32, endpoint: &EndpointData, name: Option<&NodeName>) -> Opti
         session: endpoint.guid.prefix.to_string(),
         node_number: 0,
         number: u32::from_be_bytes(endpoint.guid.entity.0),
+        enclave: endpoint.enclave.clone(),
         namespace,
         node: name,
         kind: if is_writer { Kind::Publisher(topic, qos) } else { Kind::Subscriber(topic, qos) },
@@ -194,15 +206,23 @@ fn problem(mismatch: &Mismatch, name: Option<&NodeName>) -> String {
             policies.join(" and ")
         );
     }
+    let is_one_name = there.type_name == here.type_name;
     let of = |endpoint: &EndpointData| {
         let name = type_of_key(&endpoint.type_name).unwrap_or_else(|| endpoint.type_name.clone());
-        endpoint.type_hash.as_ref().map_or(name.clone(), |hash| format!("{name} ({hash})"))
+        let hash = endpoint.type_hash.as_ref().filter(|_| is_one_name);
+        hash.map_or(name.clone(), |hash| format!("{name} ({})", short_hash(hash)))
     };
     format!(
         "{who} {does} `{topic}` with the type {}, and here it is {here_does} with {}: they do not understand each other",
         of(there),
         of(here)
     )
+}
+
+/// The first digits of a type's hash, which are enough to tell two definitions apart: `RIHS01_df668c74`.
+pub(crate) fn short_hash(hash: &str) -> &str {
+    let end = hash.find('_').map_or(0, |at| at + 1) + HASH_DIGITS;
+    hash.get(..end).unwrap_or(hash)
 }
 
 #[cfg(test)]
@@ -219,6 +239,7 @@ mod tests {
             type_hash: None,
             policies: Policies::new(true, true, Some(1)),
             addresses: Vec::new(),
+            enclave: "/".into(),
         }
     }
 
@@ -244,6 +265,42 @@ mod tests {
         assert!(reported.try_recv().is_err(), "a service is no topic");
     }
 
+    /// Lets the patience with all mismatches end.
+    fn wait_out(graph: &Arc<Graph>) {
+        for (since, _) in &mut lock(&graph.seen).mismatches {
+            *since = since.checked_sub(MISMATCH_PATIENCE).unwrap();
+        }
+        graph.tick();
+    }
+
+    #[test]
+    fn a_mismatch_of_an_endpoint_that_is_no_more_is_not_told() {
+        let graph = Graph::new(0);
+        let (here, there) = (endpoint(1, "rt/map"), endpoint(2, "rt/map"));
+        let mismatch = || Mismatch { here: here.clone(), there: there.clone(), policies: vec!["reliability"] };
+        graph.mismatch(&mismatch());
+        graph.forget(here.guid);
+        wait_out(&graph);
+        graph.mismatch(&mismatch());
+        graph.endpoint(&there, false);
+        wait_out(&graph);
+        assert_eq!(graph.take_problems(), Vec::<String>::new());
+    }
+
+    #[test]
+    fn types_are_told_with_their_hashes_only_where_their_names_are_one() {
+        let hash = |digit: &str| Some(format!("RIHS01_{}", digit.repeat(64)));
+        let here = EndpointData { type_hash: hash("a"), ..endpoint(1, "rt/map") };
+        let there = EndpointData { type_hash: hash("b"), ..endpoint(2, "rt/map") };
+        let told = |here: &EndpointData| {
+            problem(&Mismatch { here: here.clone(), there: there.clone(), policies: Vec::new() }, None)
+        };
+        let text = told(&here);
+        assert!(text.contains("OccupancyGrid (RIHS01_bbbbbbbb), and") && text.contains("(RIHS01_aaaaaaaa):"), "{text}");
+        let text = told(&EndpointData { type_name: "std_msgs::msg::dds_::String_".into(), ..here });
+        assert!(text.contains("std_msgs/msg/String:") && !text.contains("RIHS01"), "{text}");
+    }
+
     #[test]
     fn a_mismatch_is_told_once_with_the_settings_of_both_sides() {
         let graph = Graph::new(0);
@@ -254,7 +311,9 @@ mod tests {
         for _ in 0..2 {
             graph.mismatch(&Mismatch { here: here.clone(), there: there.clone(), policies: vec!["reliability"] });
             graph.tick();
+            assert!(graph.take_problems().is_empty(), "who subscribes may do so again");
         }
+        wait_out(&graph);
         let problems = graph.take_problems();
         let [problem] = problems.as_slice() else { panic!("{problems:?}") };
         for words in ["/rviz subscribes", "`/map`", "reliable, transient local", "best effort, volatile", "reliability"]

@@ -5,6 +5,7 @@ use super::dds_graph::{Graph, NAMES_TOPIC, TOPIC_PREFIX};
 use super::dds_names::{self, NodeName, TYPE, TYPE_HASH};
 use super::key_expression::{NO_HASH, Topic, type_in_keys};
 use super::liveliness::Entity;
+use super::own_name::OwnName;
 use super::qos::Qos;
 use super::rtps::{EndpointData, EntityId, Guid, LAST_DOMAIN, Participant, Policies, Reach, Reading, Sample, Writing};
 use gridweave_runtime::stage::StageError;
@@ -33,13 +34,13 @@ impl DdsNode {
     ///
     /// # Errors
     /// There is no such domain, or the system refuses the sockets.
-    pub(crate) fn start(domain: u32, node: &str, reach: Reach, peers: &[Ipv4Addr]) -> Result<Self, StageError> {
+    pub(crate) fn start(domain: u32, name: &OwnName, reach: Reach, peers: &[Ipv4Addr]) -> Result<Self, StageError> {
         let doing = "join the DDS network";
         if domain > LAST_DOMAIN {
             let error = StageError::new(doing, format!("there is no domain {domain}"));
             return Err(error.with_help(format!("domains of DDS are 0 to {LAST_DOMAIN}")));
         }
-        let participant = Participant::start(domain, node, reach, peers)
+        let participant = Participant::start(domain, [&name.node, &name.enclave], reach, peers)
             .map_err(|error| StageError::new(doing, error).with_help("`middleware = \"zenoh\"` does without DDS"))?;
         let graph = Graph::new(domain);
         participant.watch(Box::new(Arc::clone(&graph)));
@@ -48,7 +49,7 @@ impl DdsNode {
         let reading = participant.read_from(names.clone(), false, move |sample| of_others.note_names(&sample.payload));
         let own = OwnNode {
             participant: Guid { prefix: participant.prefix(), entity: EntityId::PARTICIPANT },
-            name: NodeName { namespace: "/".to_owned(), name: node.to_owned() },
+            name: NodeName { namespace: "/".to_owned(), name: name.node.clone() },
             endpoints: Mutex::default(),
             names: participant.write_to(names),
         };
@@ -87,7 +88,8 @@ impl DdsNode {
     ) -> DdsSubscriber {
         let reading = self.participant.read_from(of_topic(topic, qos), true, call);
         let of_node = OfNode::new(&self.own, reading.guid());
-        DdsSubscriber { _reading: reading, _of_node: of_node }
+        let mismatches = OfGraph { graph: Arc::clone(&self.graph), endpoint: reading.guid() };
+        DdsSubscriber { _reading: reading, _of_node: of_node, _mismatches: mismatches }
     }
 }
 
@@ -123,6 +125,18 @@ impl Drop for OfNode {
     }
 }
 
+/// What an endpoint does not match, until it is dropped.
+struct OfGraph {
+    graph: Arc<Graph>,
+    endpoint: Guid,
+}
+
+impl Drop for OfGraph {
+    fn drop(&mut self) {
+        self.graph.forget(self.endpoint);
+    }
+}
+
 /// A publisher of a topic.
 pub(crate) struct DdsPublisher {
     writing: Writing,
@@ -140,6 +154,8 @@ impl DdsPublisher {
 pub(crate) struct DdsSubscriber {
     _reading: Reading,
     _of_node: OfNode,
+    // After the reading, of which none comes any more then.
+    _mismatches: OfGraph,
 }
 
 fn of_topic(topic: &Topic, qos: Qos) -> EndpointData {
@@ -158,5 +174,6 @@ fn endpoint(topic: &str, type_name: &str, type_hash: Option<&str>, policies: Pol
         type_hash: type_hash.map(str::to_owned),
         policies,
         addresses: Vec::new(),
+        enclave: String::new(),
     }
 }

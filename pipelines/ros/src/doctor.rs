@@ -1,26 +1,25 @@
 //! The verb `doctor`: what robots there are on the network, and what is missing for a merge.
 
+use super::advice::{Findings, list};
+use super::census::{Census, Published, Topics};
 use super::definitions::Definitions;
+use super::doctor_hearing::Hearing;
 use super::key_expression::NO_HASH;
-use super::liveliness::{Entity, Kind};
-use super::middleware::Middleware;
 use super::node::Node;
+use super::own_name::OwnName;
 use super::qos::Qos;
 use super::source_parameters::SourceParameters;
 use anyhow::{Result, bail};
 use gridweave::Verb;
 use gridweave::table::Table;
-use gridweave_logs::names::rename_advice;
-use gridweave_runtime::ros::{OccupancyGrid, RosMessage};
-use gridweave_runtime::stage::{Parameters, RobotTopics, match_robot};
-use std::collections::{BTreeMap, BTreeSet};
+use gridweave_runtime::stage::{Parameters, RobotTopics};
 use std::fmt::Write;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-/// The topics of every node, whatever it does.
-const OF_EVERY_NODE: [&str; 2] = ["/rosout", "/parameter_events"];
+/// So often it is looked for topics to hear.
+const PERIOD: Duration = Duration::from_millis(100);
 
 /// The verb `doctor`.
 pub fn doctor() -> Verb {
@@ -37,63 +36,30 @@ fn look(parameters: toml::Table, longest: Duration) -> Result<String> {
         bail!("{wrong}");
     }
     let definitions = Definitions::new(&parameters.definitions);
-    let node = Node::start(parameters.connection(), "doctor")?;
-    let seen = Arc::<Mutex<BTreeSet<(Middleware, Entity)>>>::default();
-    let to = Arc::clone(&seen);
+    let name = OwnName::of_program("doctor", parameters.node.as_ref());
+    let mut node = Node::start(parameters.connection(), name.clone())?;
+    let census = Arc::<Mutex<Census>>::default();
+    let to = Arc::clone(&census);
     node.watch(move |middleware, entity, is_there| {
-        let mut seen = to.lock().unwrap_or_else(PoisonError::into_inner);
-        match is_there {
-            true => seen.insert((middleware, entity)),
-            false => seen.remove(&(middleware, entity)),
-        };
+        let owner = name.owner(&entity);
+        to.lock().unwrap_or_else(PoisonError::into_inner).note(middleware, entity, owner, is_there);
     })?;
+    let topics = || census.lock().unwrap_or_else(PoisonError::into_inner).topics();
+    let (robots, until) = (RobotTopics::default(), Instant::now() + longest);
+    let mut hearing = Hearing::default();
     // Who is there says so again and again.
-    thread::sleep(longest);
-    let seen = seen.lock().unwrap_or_else(PoisonError::into_inner);
-    let topics = published(&seen);
+    while let Some(rest) = until.checked_duration_since(Instant::now()) {
+        hearing.hear(&mut node, &topics(), &robots)?;
+        thread::sleep(rest.min(PERIOD));
+    }
+    let topics = topics();
     let mut text = networks(&node);
     write_topics(&mut text, &topics, &definitions)?;
-    write_advice(&mut text, &topics)?;
+    write_robots(&mut text, &Findings::new(&topics, &robots), &hearing, &robots)?;
     for problem in node.take_problems() {
         writeln!(text, "warning: {problem}")?;
     }
     Ok(text)
-}
-
-/// A published topic.
-struct Published {
-    ros_type: String,
-    type_hash: String,
-    middleware: Middleware,
-    qos: Qos,
-    nodes: Vec<String>,
-}
-
-/// What is published, by topic; several for one topic where types, QoS or middlewares differ.
-fn published(seen: &BTreeSet<(Middleware, Entity)>) -> BTreeMap<String, Vec<Published>> {
-    let mut topics = BTreeMap::<String, Vec<Published>>::new();
-    for (middleware, entity) in seen {
-        let Kind::Publisher(topic, qos) = &entity.kind else { continue };
-        if OF_EVERY_NODE.contains(&topic.name.as_str()) {
-            continue;
-        }
-        let of_topic = topics.entry(topic.name.clone()).or_default();
-        let is_same = |known: &&mut Published| {
-            (&known.ros_type, &known.type_hash, known.middleware) == (&topic.ros_type, &topic.type_hash, *middleware)
-                && (known.qos.is_reliable, known.qos.is_latched) == (qos.is_reliable, qos.is_latched)
-        };
-        match of_topic.iter_mut().find(is_same) {
-            Some(known) => known.nodes.push(entity.full_node_name()),
-            None => of_topic.push(Published {
-                ros_type: topic.ros_type.clone(),
-                type_hash: topic.type_hash.clone(),
-                middleware: *middleware,
-                qos: *qos,
-                nodes: vec![entity.full_node_name()],
-            }),
-        }
-    }
-    topics
 }
 
 /// Where it was looked.
@@ -108,11 +74,7 @@ fn networks(node: &Node) -> String {
     format!("domain {}, over {}\n", node.domain(), both.join(" and "))
 }
 
-fn write_topics(
-    text: &mut String,
-    topics: &BTreeMap<String, Vec<Published>>,
-    definitions: &Definitions,
-) -> std::fmt::Result {
+fn write_topics(text: &mut String, topics: &Topics, definitions: &Definitions) -> std::fmt::Result {
     if topics.is_empty() {
         return writeln!(text, "nobody publishes anything");
     }
@@ -127,11 +89,7 @@ fn write_topics(
             ];
             let Published { ros_type, middleware, nodes, .. } = published;
             table.row([name.clone(), ros_type.clone(), middleware.to_string(), qos.join(", "), nodes.join(", ")]);
-            let topic = super::key_expression::Topic {
-                name: name.clone(),
-                ros_type: ros_type.clone(),
-                type_hash: published.type_hash.clone(),
-            };
+            let topic = published.topic(name);
             let has_other_hash = |here: &String| *here != topic.type_hash && topic.type_hash != NO_HASH;
             if definitions.hash(&topic).is_some_and(|here| has_other_hash(&here)) {
                 others.push(format!("warning: `{name}` has another definition of {ros_type} than the one known here"));
@@ -143,35 +101,36 @@ fn write_topics(
 }
 
 /// Says which robots have a map, what is missing for a merge, and what to write.
-fn write_advice(text: &mut String, topics: &BTreeMap<String, Vec<Published>>) -> std::fmt::Result {
-    let pattern = RobotTopics::default().map;
-    let is_map = |of_topic: &[Published]| of_topic.iter().any(|published| published.ros_type == OccupancyGrid::NAME);
-    let maps: Vec<&str> =
-        topics.iter().filter(|(_, of_topic)| is_map(of_topic)).map(|(name, _)| name.as_str()).collect();
-    let robots: BTreeSet<&str> = maps.iter().filter_map(|topic| match_robot(&pattern, topic)).collect();
-    for robot in &robots {
-        let topic = pattern.replace("{robot}", robot);
-        let count = topics.get(&topic).map_or(0, |of_topic| of_topic.iter().map(|of| of.nodes.len()).sum::<usize>());
-        match count {
-            1 => writeln!(text, "{robot} has a map")?,
-            count => writeln!(text, "warning: {robot} has {count} maps: are there two robots of one name?")?,
+fn write_robots(text: &mut String, findings: &Findings, hearing: &Hearing, robots: &RobotTopics) -> std::fmt::Result {
+    for (topic, node) in &findings.merged {
+        writeln!(text, "`{topic}` of {node} is a map that a run of Gridweave publishes, and no robot's")?;
+    }
+    for (robot, nodes) in &findings.maps {
+        let seen = hearing.map(&robots.map.replace("{robot}", robot));
+        writeln!(text, "{robot} has a map, {seen}{}", hearing.tree(robot))?;
+        if nodes.len() > 1 {
+            let (count, nodes) = (nodes.len(), list(nodes));
+            writeln!(text, "warning: {robot} has {count} maps, of {nodes}: are there two robots of one name?")?;
         }
     }
-    if robots.len() >= 2 {
-        return writeln!(text, "to merge these: gridweave-ros run live_ros.toml");
+    for (robot, moves) in &findings.scanning {
+        let lack = if *moves { "" } else { ", and no odometry, poses or tf" };
+        writeln!(text, "{robot} has scans and no map{lack}{}", hearing.tree(robot))?;
     }
-    writeln!(text, "for a merge two robots must publish a map on `{pattern}`; there are {}", robots.len())?;
-    // What the option of logs says is what the pipeline says here.
-    let advised = rename_advice(maps.iter().copied(), &pattern);
-    let template = |option: &String| Some(option.strip_prefix("--rename '")?.split_once('=')?.0.to_owned());
-    match advised.first().and_then(template).filter(|template| template.contains("{robot}")) {
-        Some(template) => writeln!(text, "in a copy of live_ros.toml, below [robots], write: map = \"{template}\"")?,
-        None if maps.iter().any(|topic| match_robot(&pattern, topic).is_none()) => writeln!(
-            text,
-            "maps of other names: {}; run the nodes of each robot in a namespace of its own, as `namespace:=robot1`",
-            maps.join(", ")
-        )?,
-        None => {}
+    if let Some(tree) = hearing.shared_tree() {
+        writeln!(text, "{tree}")?;
     }
-    Ok(())
+    for (topic, ros_type) in &findings.wrong_types {
+        writeln!(text, "warning: `{topic}` is no map, but {ros_type}")?;
+    }
+    let (with_map, with_scans) = (findings.maps.len(), findings.scanning.len());
+    match (with_map + with_scans >= 2, with_scans) {
+        (true, 0) => writeln!(text, "to merge these: gridweave-ros run live_ros")?,
+        (true, _) => writeln!(text, "to merge these, with maps drawn of scans: gridweave-ros run live_ros_scans")?,
+        (false, _) => {
+            writeln!(text, "for a merge two robots must publish a map on `{}`; there are {with_map}", robots.map)?
+        }
+    }
+    let is_said = with_map + with_scans >= 2;
+    findings.advice(is_said).iter().try_for_each(|advice| writeln!(text, "{advice}"))
 }

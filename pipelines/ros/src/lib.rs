@@ -17,7 +17,9 @@
 
 #![forbid(unsafe_code)]
 
+mod advice;
 pub mod attachment;
+mod census;
 mod changed_part;
 mod connection;
 mod dds_graph;
@@ -26,6 +28,8 @@ mod dds_node;
 mod definitions;
 mod discovery_range;
 mod doctor;
+mod doctor_hearing;
+mod double_publishers;
 mod inbox;
 pub mod key_expression;
 pub mod liveliness;
@@ -33,6 +37,9 @@ mod map_subscribers;
 mod map_topics;
 mod middleware;
 mod node;
+mod offered;
+mod other_runs;
+mod own_name;
 pub mod qos;
 mod robot_trees;
 pub mod ros_arguments;

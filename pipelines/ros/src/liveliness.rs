@@ -32,6 +32,8 @@ pub struct Entity {
     pub node_number: u32,
     /// Its number in the session; for a node the number of the node.
     pub number: u32,
+    /// The enclave of its node; `/` without SROS.
+    pub enclave: String,
     /// The namespace of its node: `/`, or such as `/robot1`.
     pub namespace: String,
     /// The name of its node.
@@ -66,9 +68,8 @@ impl fmt::Display for Entity {
             Kind::Subscriber(topic, qos) => ("MS", Some((topic, qos))),
         };
         let Self { domain, session, node_number, number, .. } = self;
-        let (namespace, node) = (mangled(&self.namespace), mangled(&self.node));
-        // There is no enclave of SROS.
-        write!(f, "{SPACE}/{domain}/{session}/{node_number}/{number}/{short}/%/{namespace}/{node}")?;
+        let [enclave, namespace, node] = [&self.enclave, &self.namespace, &self.node].map(|name| mangled(name));
+        write!(f, "{SPACE}/{domain}/{session}/{node_number}/{number}/{short}/{enclave}/{namespace}/{node}")?;
         match topic {
             None => Ok(()),
             Some((topic, qos)) => {
@@ -85,7 +86,7 @@ impl FromStr for Entity {
     /// An error for an invalid token, or one of another kind, such as a service.
     fn from_str(token: &str) -> Result<Self, ()> {
         let parts: Vec<&str> = token.split('/').collect();
-        let [SPACE, domain, session, node_number, number, short, _enclave, namespace, node, topic @ ..] =
+        let [SPACE, domain, session, node_number, number, short, enclave, namespace, node, topic @ ..] =
             parts.as_slice()
         else {
             return Err(());
@@ -109,6 +110,7 @@ impl FromStr for Entity {
             session: (*session).to_owned(),
             node_number: number_of(node_number)?,
             number: number_of(number)?,
+            enclave: demangled(enclave),
             namespace: demangled(namespace),
             node: demangled(node),
             kind,
@@ -136,6 +138,7 @@ mod tests {
             session: "aac3178e146ba6f1fc6e6a4085e77f21".into(),
             node_number: 0,
             number: 0,
+            enclave: "/".into(),
             namespace: "/".into(),
             node: "listener".into(),
             kind: Kind::Node,
@@ -179,11 +182,14 @@ mod tests {
     }
 
     #[test]
-    fn names_in_a_namespace_are_read_back() {
+    fn names_in_a_namespace_or_an_enclave_are_read_back() {
         let node = Entity { namespace: "/fleet/robot1".into(), ..listener() };
         assert_eq!(node.to_string(), "@ros2_lv/2/aac3178e146ba6f1fc6e6a4085e77f21/0/0/NN/%/%fleet%robot1/listener");
         assert_eq!(node.to_string().parse(), Ok(node.clone()));
         assert_eq!(node.full_node_name(), "/fleet/robot1/listener");
+        let node = Entity { enclave: "/fleet/a".into(), ..listener() };
+        assert_eq!(node.to_string(), "@ros2_lv/2/aac3178e146ba6f1fc6e6a4085e77f21/0/0/NN/%fleet%a/%/listener");
+        assert_eq!(node.to_string().parse(), Ok(node));
         assert_eq!(listener().full_node_name(), "/listener");
     }
 

@@ -109,6 +109,7 @@ mod tests {
             session: session.into(),
             node_number: 0,
             number: 10,
+            enclave: "/".into(),
             namespace: "/".into(),
             node: "rviz".into(),
             kind: Kind::Subscriber(Topic::known(name, ros_type).unwrap(), qos),

@@ -71,6 +71,11 @@ impl MapTopics {
         Ok(Self { subscribers, topics, late_join_thread: Some(late_join_thread) })
     }
 
+    /// Whether a map is published on a topic.
+    pub(crate) fn has(&self, name: &str) -> bool {
+        lock(&self.topics).contains_key(name)
+    }
+
     /// Publishes a map on a topic, as a whole or as an update. `None` if the number of cells does not match its size.
     ///
     /// # Errors

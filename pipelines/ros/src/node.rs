@@ -6,6 +6,7 @@ use super::dds_node::{DdsNode, DdsPublisher, DdsSubscriber};
 use super::key_expression::Topic;
 use super::liveliness::Entity;
 use super::middleware::{Middleware, Middlewares};
+use super::own_name::OwnName;
 use super::qos::Qos;
 use super::rtps;
 use super::zenoh_node::{ZenohNode, ZenohPublisher, ZenohSubscriber};
@@ -15,6 +16,7 @@ use std::sync::Arc;
 
 /// A node.
 pub(crate) struct Node {
+    name: OwnName,
     domain: u32,
     dds: Option<DdsNode>,
     zenoh: Option<ZenohNode>,
@@ -44,6 +46,14 @@ impl Received {
         }
     }
 
+    /// The identifier of its publisher, if it is one of Zenoh. On DDS nothing comes of a run of Gridweave.
+    pub(crate) fn zenoh_publisher(&self) -> Option<[u8; 16]> {
+        match self {
+            Self::Dds(_) => None,
+            Self::Zenoh(sample) => Some(Attachment::from_bytes(&sample.attachment()?.to_bytes())?.gid),
+        }
+    }
+
     /// What its publisher says of it; `None` if it says nothing.
     pub(crate) fn sent(&self) -> Option<Sent> {
         match self {
@@ -61,13 +71,12 @@ impl Received {
 }
 
 impl Node {
-    /// Joins the network as a node, named by the parameters or after the stage.
+    /// Joins the network as a node.
     ///
     /// # Errors
     /// The network cannot be joined. Where either middleware would do, that is only so if neither can.
-    pub(crate) fn start(connection: Connection, stage: &str) -> Result<Self, StageError> {
+    pub(crate) fn start(connection: Connection, name: OwnName) -> Result<Self, StageError> {
         let domain = connection.domain()?;
-        let name = connection.node.clone().unwrap_or_else(|| format!("gridweave_{}", usable(stage)));
         let middlewares = connection.middleware;
         let dds = match middlewares.has(Middleware::Dds) {
             true => connection.join_dds(domain, &name).map(Some),
@@ -82,13 +91,18 @@ impl Node {
         };
         let zenoh =
             middlewares.has(Middleware::Zenoh).then(|| ZenohNode::start(connection, domain, &name)).transpose()?;
-        Ok(Self { domain, dds, zenoh })
+        Ok(Self { name, domain, dds, zenoh })
     }
 
     /// The names of its session and its participant.
     pub(crate) fn session_names(&self) -> Vec<String> {
         let zenoh = self.zenoh.as_ref().map(|node| node.session_name().to_owned());
         self.dds.as_ref().map(DdsNode::session_name).into_iter().chain(zenoh).collect()
+    }
+
+    /// Its name.
+    pub(crate) const fn name(&self) -> &OwnName {
+        &self.name
     }
 
     /// Whether it is on DDS.
@@ -195,9 +209,4 @@ impl Publisher {
 pub(crate) struct Subscriber {
     _dds: Option<DdsSubscriber>,
     _zenoh: Option<ZenohSubscriber>,
-}
-
-/// The name of a stage as part of a node's name.
-fn usable(stage: &str) -> String {
-    stage.replace(|c: char| !c.is_ascii_alphanumeric(), "_")
 }

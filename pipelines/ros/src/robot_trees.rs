@@ -2,6 +2,7 @@
 
 use super::liveliness::{Entity, Kind};
 use super::node::Node;
+use super::own_name::Owner;
 use gridweave_logs::tf::tf_topic;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::TransformStamped;
@@ -23,9 +24,10 @@ impl RobotTrees {
     /// The session has failed.
     pub(crate) fn watch(node: &Node) -> Result<Self, StageError> {
         let seen = Arc::<Mutex<BTreeMap<String, String>>>::default();
-        let (to, own) = (Arc::clone(&seen), node.session_names());
+        let (to, own, name) = (Arc::clone(&seen), node.session_names(), node.name().clone());
         node.watch(move |_, entity, is_present| {
-            let is_other = is_present && !own.contains(&entity.session);
+            // What another run publishes in the tree of a robot makes none.
+            let is_other = is_present && !own.contains(&entity.session) && name.owner(&entity) == Owner::Other;
             if let Some((robot, namespace)) = robot_tree(&entity).filter(|_| is_other) {
                 to.lock().unwrap_or_else(PoisonError::into_inner).insert(robot, namespace);
             }

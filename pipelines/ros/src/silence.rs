@@ -1,10 +1,19 @@
 //! What to say where no robot is heard.
 
+use super::advice::Findings;
+use super::census::Census;
+use super::liveliness::Entity;
+use super::middleware::Middleware;
 use super::node::Node;
+use super::own_name::Owner;
+use gridweave_runtime::stage::RobotTopics;
 use std::time::{Duration, Instant};
 
 /// The time that a router may take to answer before a warning.
 const PATIENCE: Duration = Duration::from_secs(3);
+
+/// So often it is looked what of others fits.
+const LOOK_PERIOD: Duration = Duration::from_secs(1);
 
 /// Whether anybody is heard, and since when that has been so.
 pub(crate) struct Silence {
@@ -12,15 +21,66 @@ pub(crate) struct Silence {
     discovery_timeout: Duration,
     is_connected: bool,
     since: Instant,
+    census: Census,
+    /// Since when a robot, or whoever it is, has published anything.
+    published_since: Option<Instant>,
+    /// When it was looked last whether anything of it fits.
+    looked: Option<Instant>,
+    /// Whether something has fitted, or it was said what does not.
+    is_settled: bool,
 }
 
 impl Silence {
     pub(crate) fn new(discovery_timeout: Duration) -> Self {
-        Self { discovery_timeout, is_connected: false, since: Instant::now() }
+        Self {
+            discovery_timeout,
+            is_connected: false,
+            since: Instant::now(),
+            census: Census::default(),
+            published_since: None,
+            looked: None,
+            is_settled: false,
+        }
+    }
+
+    /// A publisher of another node is there, or is no more.
+    pub(crate) fn note(&mut self, middleware: Middleware, entity: Entity, owner: Owner, is_there: bool) {
+        self.census.note(middleware, entity, owner, is_there);
+        if !self.census.has_no_robots() {
+            self.published_since.get_or_insert_with(Instant::now);
+        }
+    }
+
+    /// What to warn of where somebody publishes, and nothing that is a robot's, in a pipeline with these topics.
+    /// `hears_any` is whether it hears anything, and `draws_maps` whether it draws maps of scans.
+    pub(crate) fn misfit(&mut self, robots: &RobotTopics, [hears_any, draws_maps]: [bool; 2]) -> Option<String> {
+        let is_late = self.published_since.is_some_and(|since| since.elapsed() > self.discovery_timeout);
+        let is_due = self.looked.is_none_or(|last| last.elapsed() > LOOK_PERIOD);
+        if self.is_settled || !is_late || !is_due {
+            return None;
+        }
+        self.looked = Some(Instant::now());
+        let findings = Findings::new(&self.census.topics(), robots);
+        if !findings.maps.is_empty() || draws_maps && !findings.scanning.is_empty() {
+            self.is_settled = true;
+            return None;
+        }
+        let (advice, pattern) = (findings.advice(draws_maps), &robots.map);
+        self.is_settled = !advice.is_empty();
+        match self.is_settled {
+            true => Some(format!("no robot publishes a map on `{pattern}`: {}", advice.join("; "))),
+            false if hears_any || self.census.has_no_robots() || !findings.wrong_types.is_empty() => None,
+            false => Some(format!(
+                "no robot publishes a map on `{pattern}`, nor anything else that is taken: `gridweave-ros doctor` lists what there is"
+            )),
+        }
     }
 
     /// What to warn of as long as nobody publishes.
     pub(crate) fn warning(&mut self, node: &Node) -> Option<String> {
+        if self.published_since.is_some() {
+            return None;
+        }
         let router = node.looks_for_router();
         if node.has_zenoh() && router.is_none() && !self.is_connected {
             (self.is_connected, self.since) = (true, Instant::now());
@@ -71,7 +131,29 @@ fn not_spoken(variable: impl Fn(&str) -> String) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::census::tests::publisher;
     use super::*;
+    use gridweave_runtime::ros::{OccupancyGrid, RosMessage};
+
+    #[test]
+    fn somebody_who_publishes_nothing_that_fits_is_told_once() {
+        let map = |topic| publisher(["/robot1", "slam_toolbox"], topic, OccupancyGrid::NAME, 1);
+        let (mut silence, robots) = (Silence::new(Duration::ZERO), RobotTopics::default());
+        let told = |entity: Entity, silence: &mut Silence| {
+            silence.note(Middleware::Dds, entity, Owner::Other, true);
+            silence.looked = None;
+            silence.published_since = Instant::now().checked_sub(LOOK_PERIOD);
+            silence.misfit(&robots, [false, false])
+        };
+        let text = told(publisher(["/", "a"], "/a", "std_msgs/msg/String", 1), &mut silence);
+        assert!(text.unwrap().contains("gridweave-ros doctor"));
+        let text = told(map("/map"), &mut silence).unwrap();
+        assert!(text.contains("-r /map:=map") && text.lines().count() == 1, "{text}");
+        assert_eq!(told(map("/b"), &mut silence), None);
+        let mut silence = Silence::new(Duration::ZERO);
+        assert_eq!(told(map("/robot1/map"), &mut silence), None);
+        assert!(silence.is_settled);
+    }
 
     #[test]
     fn what_keeps_robots_from_being_heard_is_named() {

@@ -6,6 +6,8 @@ use super::key_expression::Topic;
 use super::map_topics::{MapTopics, Sent};
 use super::middleware::Middlewares;
 use super::node::{Node, Publisher};
+use super::other_runs::OtherRuns;
+use super::own_name::OwnName;
 use super::qos::Qos;
 use super::robot_trees::{RobotTrees, in_robot_tree};
 use super::settled_frames::{Change, SettledFrames};
@@ -48,6 +50,9 @@ pub struct SinkParameters {
     pub zenoh_config: Option<PathBuf>,
     /// The name of the ROS 2 node; the default is `gridweave_` and the name of the stage.
     pub node: Option<String>,
+    /// Whether other runs of Gridweave take what is published for that of robots. If not, they leave it out, as this run
+    /// does: no run is to merge its own map.
+    pub as_robot: bool,
     /// Topics with other names than in a log, as `OLD=NEW`: `["/map=/fleet/map"]`. `{robot}` matches one part of both.
     pub rename: Vec<String>,
     /// Whether changed parts of a map are published on its topic with the suffix `_updates`
@@ -67,6 +72,7 @@ impl Default for SinkParameters {
             listen: vec![LISTEN.to_owned()],
             zenoh_config: None,
             node: None,
+            as_robot: false,
             rename: Vec::new(),
             map_updates: true,
         }
@@ -122,6 +128,7 @@ pub fn kind() -> StageKind {
 
 /// Publishes its inputs in ROS 2.
 struct RosSink {
+    other_runs: OtherRuns,
     /// The published maps; `None` if maps are always sent whole.
     maps: Option<MapTopics>,
     node: Node,
@@ -145,8 +152,11 @@ impl RosSink {
         }
         let doing = || format!("make the stage `{}`", context.stage);
         let renames = parameters.renames().map_err(|wrong| StageError::new(doing(), wrong))?;
-        let node = Node::start(parameters.connection(), &context.stage)?;
+        let name = OwnName::of_stage(context, parameters.node.as_ref());
+        let name = if parameters.as_robot { name.as_robot() } else { name };
+        let node = Node::start(parameters.connection(), name)?;
         Ok(Self {
+            other_runs: OtherRuns::watch(&node)?,
             maps: parameters.map_updates.then(|| MapTopics::watch(&node)).transpose()?,
             trees: RobotTrees::watch(&node)?,
             published_in_trees: BTreeMap::new(),
@@ -160,6 +170,7 @@ impl RosSink {
 
     fn receive(&mut self, message: &Message, output: &Output<()>) -> Result<(), StageError> {
         self.node.take_problems().into_iter().for_each(|problem| output.warn(problem));
+        self.check_other_runs(output);
         let ros_type = self.types.get(message.wire()).cloned().unwrap_or_default();
         let topic = message.header().topic.as_str().to_owned();
         self.publish_in_robot_trees(output)?;
@@ -185,6 +196,17 @@ impl RosSink {
 
     fn finish(&mut self, _: &Output<()>) -> Result<(), StageError> {
         self.maps.as_ref().map_or(Ok(()), MapTopics::send_updated)
+    }
+
+    /// Warns of other runs that publish the same.
+    fn check_other_runs(&mut self, output: &Output<()>) {
+        let (publishers, maps) = (&self.publishers, &self.maps);
+        let is_published =
+            |topic: &str| publishers.contains_key(topic) || maps.as_ref().is_some_and(|maps| maps.has(topic));
+        for text in self.other_runs.warnings(is_published) {
+            tracing::warn!("{text}");
+            output.warn(text);
+        }
     }
 
     /// Publishes a map, or an update of its changed part.

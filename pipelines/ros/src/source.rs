@@ -1,11 +1,15 @@
 //! The stage `ros_source`: takes what robots publish into a live pipeline.
 
+use super::dds_graph::short_hash;
 use super::definitions::Definitions;
+use super::double_publishers;
 use super::inbox::{Event, Inbox};
 use super::key_expression::{NO_HASH, Topic};
 use super::liveliness::{Entity, Kind};
 use super::middleware::Middleware;
 use super::node::{Node, Received, Subscriber};
+use super::offered::{Offered, Seen};
+use super::own_name::{OwnName, Owner};
 use super::qos::Qos;
 use super::silence::Silence;
 use super::source_parameters::SourceParameters;
@@ -13,7 +17,8 @@ use gridweave_bridge::clock::nanoseconds_now;
 use gridweave_logs::qos;
 use gridweave_logs::source::{LiveMessage, LiveRouter, RobotMessages, RobotReading};
 use gridweave_runtime::message::{Channel, LogTime};
-use gridweave_runtime::stage::{Context, Output, Source, StageError, StageKind};
+use gridweave_runtime::ros::{OccupancyGrid, RosMessage};
+use gridweave_runtime::stage::{Context, Output, RobotTopics, Source, StageError, StageKind, match_robot};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -46,9 +51,10 @@ pub struct RosSource {
     waiting_scans: Vec<(Instant, Middleware, Entity)>,
     wait_for_map: Duration,
     update_period: Duration,
+    robots: RobotTopics,
+    /// The identifiers on Zenoh of publishers of Gridweave.
+    left_out: BTreeSet<[u8; 16]>,
     silence: Silence,
-    /// Whether another program has published anything.
-    has_publishers: bool,
     /// When the maps with updates were sent last.
     updates_sent: Instant,
     /// Those of the topics that are heard.
@@ -58,30 +64,14 @@ pub struct RosSource {
     log_time: u64,
 }
 
-/// A topic on a middleware.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Offered {
-    topic: Topic,
-    middleware: Middleware,
-}
-
-/// A topic that was seen.
-struct Seen {
-    /// Its number in the router.
-    number: usize,
-    /// What all that publish it offer.
-    qos: Qos,
-    /// Those that publish it.
-    publishers: BTreeSet<Entity>,
-}
-
 impl RosSource {
     /// Joins the network.
     ///
     /// # Errors
     /// It cannot be joined.
     pub fn new(parameters: SourceParameters, context: &Context) -> Result<Self, StageError> {
-        let node = Node::start(parameters.connection(), &context.stage)?;
+        let name = OwnName::of_stage(context, parameters.node.as_ref());
+        let node = Node::start(parameters.connection(), name)?;
         let duration = |seconds| Duration::try_from_secs_f64(seconds).unwrap_or_default();
         let inbox = Arc::new(Inbox::default());
         let events = Arc::clone(&inbox);
@@ -97,8 +87,9 @@ impl RosSource {
             waiting_scans: Vec::new(),
             wait_for_map: duration(parameters.wait_for_map),
             update_period: duration(parameters.update_period),
+            robots: context.robots.clone(),
+            left_out: BTreeSet::new(),
             silence: Silence::new(duration(parameters.discovery_timeout)),
-            has_publishers: false,
             updates_sent: Instant::now(),
             subscribers: BTreeMap::new(),
             warned: BTreeSet::new(),
@@ -118,6 +109,25 @@ impl RosSource {
         if self.node.session_names().contains(&entity.session) {
             return Ok(());
         }
+        let owner = self.node.name().owner(&entity);
+        self.silence.note(middleware, entity.clone(), owner, is_there);
+        if owner != Owner::Other {
+            match is_there {
+                true => self.left_out.insert(entity.gid()),
+                false => self.left_out.remove(&entity.gid()),
+            };
+            let is_merged_map =
+                topic.ros_type == OccupancyGrid::NAME && match_robot(&self.robots.map, &topic.name).is_some();
+            if is_there && is_merged_map && owner == Owner::OtherRun {
+                let (name, node) = (&topic.name, entity.full_node_name());
+                let text = format!(
+                    "`{name}` is a map that another run of Gridweave publishes, by its node {node}: it is left out. If it is to be \
+                     merged, set `as_robot` in that stage"
+                );
+                self.warn_once(text, output);
+            }
+            return Ok(());
+        }
         let offered = Offered { topic, middleware };
         if !is_there {
             self.waiting_scans.retain(|(_, _, waiting)| *waiting != entity);
@@ -130,7 +140,6 @@ impl RosSource {
         }
         if !self.topics.contains_key(&offered) {
             let channel = self.channel(&offered.topic, qos);
-            self.has_publishers |= !is_of_every_node(&channel.topic);
             if self.router.scanning_robot(&channel).is_some() {
                 if output.takes_scans() {
                     self.waiting_scans.push((Instant::now(), middleware, entity));
@@ -215,9 +224,12 @@ impl RosSource {
             let is_other = |here: &String| *here != topic.type_hash && topic.type_hash != NO_HASH;
             if let Some(here) = self.definitions.hash(topic).filter(is_other) {
                 wrong.push(format!(
-                    "`{}` is published with another definition of {} than the one known here ({} there, {here} here): its messages \
+                    "`{}` is published with another definition of {} than the one known here ({} there, {} here): its messages \
                      are not taken",
-                    topic.name, topic.ros_type, topic.type_hash
+                    topic.name,
+                    topic.ros_type,
+                    short_hash(&topic.type_hash),
+                    short_hash(&here)
                 ));
                 continue;
             }
@@ -272,15 +284,7 @@ impl RosSource {
         let of_name = self.topics.iter().filter(|(other, _)| is_same(other));
         let publishers: Vec<&Entity> = of_name.flat_map(|(_, seen)| &seen.publishers).collect();
         if publishers.len() > 1 {
-            let nodes: Vec<String> = publishers
-                .iter()
-                .map(|entity| format!("{} in the session {}", entity.full_node_name(), entity.session))
-                .collect();
-            let text = format!(
-                "`{name}` is published by {} programs at once ({}): are there two robots of one name? What they say of it is mixed up",
-                publishers.len(),
-                nodes.join(", ")
-            );
+            let text = double_publishers::warning(name, &publishers);
             tracing::warn!("{text}");
             output.warn(text);
         }
@@ -315,6 +319,9 @@ impl RosSource {
         arrived: i64,
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
+        if message.zenoh_publisher().is_some_and(|publisher| self.left_out.contains(&publisher)) {
+            return Ok(());
+        }
         // The clock of the machine may be set back, and what is sent may not.
         self.log_time = self.log_time.max(u64::try_from(arrived).unwrap_or_default());
         output.set_log_time(LogTime(self.log_time));
@@ -332,33 +339,11 @@ impl RosSource {
     fn check_network(&mut self, output: &Output<RobotMessages>) {
         // They were logged already.
         self.node.take_problems().into_iter().for_each(|problem| output.warn(problem));
-        if !self.has_publishers
-            && let Some(text) = self.silence.warning(&self.node)
-        {
-            self.warn_once(text, output);
-        }
+        let hears_any = !self.subscribers.is_empty() || !self.waiting_scans.is_empty();
+        let texts =
+            [self.silence.warning(&self.node), self.silence.misfit(&self.robots, [hears_any, output.takes_scans()])];
+        texts.into_iter().flatten().for_each(|text| self.warn_once(text, output));
     }
-}
-
-impl Seen {
-    /// The quality of service that all that publish the topic offer.
-    fn offered_by_all(&self) -> Qos {
-        let offers = self.publishers.iter().filter_map(|entity| match &entity.kind {
-            Kind::Publisher(_, qos) => Some(*qos),
-            _ => None,
-        });
-        let both = |a: Qos, b: Qos| Qos {
-            is_reliable: a.is_reliable && b.is_reliable,
-            is_latched: a.is_latched && b.is_latched,
-            depth: a.depth.max(b.depth),
-        };
-        offers.reduce(both).unwrap_or(self.qos)
-    }
-}
-
-/// Whether every node of ROS publishes a topic of this name, whatever it does.
-fn is_of_every_node(topic: &str) -> bool {
-    ["/rosout", "/parameter_events"].contains(&topic)
 }
 
 impl Source for RosSource {

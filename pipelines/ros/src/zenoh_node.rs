@@ -4,6 +4,7 @@ use super::attachment::Attachment;
 use super::connection::Connection;
 use super::key_expression::Topic;
 use super::liveliness::{Entity, Kind};
+use super::own_name::OwnName;
 use super::qos::Qos;
 use gridweave_bridge::clock::nanoseconds_now;
 use gridweave_bridge::zenoh_session::{in_words, is_connected};
@@ -39,15 +40,16 @@ impl ZenohNode {
     ///
     /// # Errors
     /// The network cannot be joined.
-    pub(crate) fn start(connection: Connection, domain: u32, node: &str) -> Result<Self, StageError> {
+    pub(crate) fn start(connection: Connection, domain: u32, name: &OwnName) -> Result<Self, StageError> {
         let session = connection.open()?;
         let identity = Entity {
             domain,
             session: session.zid().to_string(),
             node_number: 0,
             number: 0,
+            enclave: name.enclave.clone(),
             namespace: "/".to_owned(),
-            node: node.to_owned(),
+            node: name.node.clone(),
             kind: Kind::Node,
         };
         let token = declare(&session, &identity)?;

@@ -23,16 +23,25 @@ pub(crate) struct ParticipantData {
     pub(crate) user: Vec<SocketAddrV4>,
     /// So long after it was last heard of it is taken to be gone.
     pub(crate) lease: Duration,
+    /// Its enclave of SROS, `/` without one, or nothing if it is no program of ROS.
+    pub(crate) enclave: String,
 }
 
 impl ParticipantData {
     pub(crate) fn read(payload: &[u8]) -> Option<Self> {
-        let mut data = Self { prefix: Prefix::UNKNOWN, discovery: Vec::new(), user: Vec::new(), lease: DEFAULT_LEASE };
+        let mut data = Self {
+            prefix: Prefix::UNKNOWN,
+            discovery: Vec::new(),
+            user: Vec::new(),
+            lease: DEFAULT_LEASE,
+            enclave: String::new(),
+        };
         for (parameter, mut value) in of_sample(payload)? {
             match parameter {
                 id::PARTICIPANT_GUID => data.prefix = Guid::from_bytes(value.rest())?.prefix,
                 id::METATRAFFIC_UNICAST_LOCATOR => data.discovery.extend(locator::read(&mut value)),
                 id::DEFAULT_UNICAST_LOCATOR => data.user.extend(locator::read(&mut value)),
+                id::USER_DATA => data.enclave = value_in(&mut value, "enclave").unwrap_or_default(),
                 id::LEASE_DURATION => data.lease = Duration::from_secs(u64::from(value.u32()?)).max(MIN_LEASE),
                 _ => {}
             }
@@ -51,8 +60,7 @@ impl ParticipantData {
             .with(id::BUILTIN_ENDPOINTS, &ENDPOINTS.to_le_bytes())
             .with(id::LEASE_DURATION, &[(self.lease.as_secs() as u32).to_le_bytes(), [0; 4]].concat())
             .with_text(id::ENTITY_NAME, name)
-            // As ROS has it where there is no enclave of SROS.
-            .with_bytes(id::USER_DATA, b"enclave=/;");
+            .with_bytes(id::USER_DATA, format!("enclave={};", self.enclave).as_bytes());
         for (parameter, addresses) in
             [(id::METATRAFFIC_UNICAST_LOCATOR, &self.discovery), (id::DEFAULT_UNICAST_LOCATOR, &self.user)]
         {
@@ -83,6 +91,8 @@ pub(crate) struct EndpointData {
     pub(crate) policies: Policies,
     /// Where it is reached, if not where its participant is.
     pub(crate) addresses: Vec<SocketAddrV4>,
+    /// The enclave of its participant, which says it.
+    pub(crate) enclave: String,
 }
 
 impl EndpointData {
@@ -95,13 +105,14 @@ impl EndpointData {
             // What holds where nothing is said.
             policies: Policies::new(is_writer, false, Some(1)),
             addresses: Vec::new(),
+            enclave: String::new(),
         };
         for (parameter, mut value) in of_sample(payload)? {
             match parameter {
                 id::ENDPOINT_GUID => data.guid = Guid::from_bytes(value.rest())?,
                 id::TOPIC_NAME => data.topic = value.text()?,
                 id::TYPE_NAME => data.type_name = value.text()?,
-                id::USER_DATA => data.type_hash = user_data(&mut value).and_then(|text| hash_in(&text)),
+                id::USER_DATA => data.type_hash = value_in(&mut value, "typehash"),
                 id::UNICAST_LOCATOR => data.addresses.extend(locator::read(&mut value)),
                 other => data.policies.note(other, &mut value)?,
             }
@@ -130,14 +141,11 @@ impl EndpointData {
     }
 }
 
-fn user_data(value: &mut Cursor<'_>) -> Option<String> {
-    let length = value.u32()? as usize;
-    Some(String::from_utf8_lossy(value.take(length)?).into_owned())
-}
-
-/// The hash in the user data of an endpoint: `typehash=RIHS01_...;`.
-fn hash_in(user_data: &str) -> Option<String> {
-    user_data.split(';').find_map(|pair| pair.strip_prefix("typehash=")).map(str::to_owned)
+/// A value in user data, as ROS writes them: `typehash=RIHS01_...;`.
+fn value_in(user_data: &mut Cursor<'_>, key: &str) -> Option<String> {
+    let length = user_data.u32()? as usize;
+    let text = String::from_utf8_lossy(user_data.take(length)?);
+    text.split(';').find_map(|pair| pair.strip_prefix(key)?.strip_prefix('=')).map(str::to_owned)
 }
 
 #[cfg(test)]
@@ -152,7 +160,13 @@ mod tests {
     #[test]
     fn a_participant_is_read_back() {
         let (discovery, user) = (vec![address(7410)], vec![address(7411), address(7413)]);
-        let data = ParticipantData { prefix: Prefix([3; 12]), discovery, user, lease: Duration::from_secs(20) };
+        let data = ParticipantData {
+            prefix: Prefix([3; 12]),
+            discovery,
+            user,
+            lease: Duration::from_secs(20),
+            enclave: "/a".into(),
+        };
         assert_eq!(ParticipantData::read(&data.to_bytes("gridweave", 0, Some(address(7400)))), Some(data));
     }
 
@@ -165,6 +179,7 @@ mod tests {
             type_hash: Some("RIHS01_00".into()),
             policies: Policies::new(true, true, Some(1)),
             addresses: vec![address(7411)],
+            enclave: String::new(),
         };
         let bytes = data.to_bytes();
         assert_eq!(EndpointData::read(&bytes, true).as_ref(), Some(&data));

@@ -85,18 +85,18 @@ fn new_prefix() -> Prefix {
 }
 
 impl Participant {
-    /// Joins a domain. `name` is what others may show.
+    /// Joins a domain. `name` is what others may show, `enclave` what programs of ROS say of themselves.
     ///
     /// # Errors
     /// The system refuses a socket or a thread.
-    pub(crate) fn start(domain: u32, name: &str, reach: Reach, peers: &[Ipv4Addr]) -> io::Result<Self> {
+    pub(crate) fn start(domain: u32, [name, enclave]: [&str; 2], reach: Reach, peers: &[Ipv4Addr]) -> io::Result<Self> {
         let network = Network::open(domain, reach, peers)?;
         let [discovery, user] = network.locators();
         let prefix = new_prefix();
         let shared = Arc::new(Shared {
             domain,
             name: name.to_owned(),
-            own: ParticipantData { prefix, discovery, user, lease: LEASE },
+            own: ParticipantData { prefix, discovery, user, lease: LEASE, enclave: enclave.to_owned() },
             network,
             state: Mutex::new(State::new(prefix)),
             readers: Mutex::default(),
@@ -130,16 +130,16 @@ impl Participant {
     }
 
     /// Makes a reader, and calls `call` with what it hears: all that is published of its topic and type or, if it
-    /// `hears_one_definition`, what has the same definition of the type. Of `data` all but the identifier counts.
+    /// `hears_robots`, what has the same definition of the type and is of no run of Gridweave. Of `data` all but the identifier counts.
     pub(crate) fn read_from(
         &self,
         data: EndpointData,
-        hears_one_definition: bool,
+        hears_robots: bool,
         call: impl Fn(Sample) + Send + Sync + 'static,
     ) -> Reading {
         // What comes at once waits until it is known for whom.
         let mut readers = lock(&self.shared.readers);
-        let role = if hears_one_definition { Role::ReaderOfOneDefinition } else { Role::Reader };
+        let role = if hears_robots { Role::ReaderOfRobots } else { Role::Reader };
         let guid = self.shared.change(|state, now| state.create(data, role, now));
         readers.insert(guid.entity, Arc::new(call));
         Reading { shared: Arc::clone(&self.shared), guid }

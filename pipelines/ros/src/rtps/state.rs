@@ -1,5 +1,6 @@
 //! What a participant knows: its endpoints, the other participants and theirs, and who matches whom.
 
+use super::super::own_name::is_of_gridweave;
 use super::discovered::{EndpointData, ParticipantData};
 use super::guid::{EntityId, Guid, Prefix};
 use super::locator::reachable;
@@ -36,8 +37,8 @@ pub(crate) struct Mismatch {
 pub(crate) enum Role {
     Writer,
     Reader,
-    /// A reader that hears only what has the same definition of the type.
-    ReaderOfOneDefinition,
+    /// A reader that hears only what has the same definition of the type, and no run of Gridweave.
+    ReaderOfRobots,
 }
 
 /// A writer or reader here, as it is announced.
@@ -192,22 +193,22 @@ impl State {
     }
 
     /// Another participant's endpoint is there, or is as `data` says from now on.
-    pub(super) fn note_endpoint(&mut self, data: EndpointData, now: Instant) {
+    pub(super) fn note_endpoint(&mut self, mut data: EndpointData, now: Instant) {
         let guid = data.guid;
-        if !self.peers.contains_key(&guid.prefix) {
-            return;
-        }
+        let Some(peer) = self.peers.get(&guid.prefix) else { return };
+        data.enclave.clone_from(&peer.data.enclave);
         match self.endpoints.get(&guid) {
             Some(known) if *known == data => return,
             Some(_) => self.remove_endpoint(guid),
             None => {}
         }
-        self.events.push(Event::Endpoint(Box::new(data.clone()), true));
-        self.endpoints.insert(guid, data);
+        self.endpoints.insert(guid, data.clone());
         let own: Vec<EntityId> = self.announced.keys().copied().collect();
         for entity in own {
             self.match_pair(entity, guid, now);
         }
+        // After the mismatches, which are over where somebody subscribes again because of it.
+        self.events.push(Event::Endpoint(Box::new(data), true));
     }
 
     pub(super) fn remove_endpoint(&mut self, guid: Guid) {
@@ -233,7 +234,7 @@ impl State {
             self.events.push(Event::Mismatch(Box::new(mismatch)));
         }
         // The writer takes it for a reader, and so it is one, though it may not pass on what it gets.
-        let is_heard = announced.role != Role::ReaderOfOneDefinition || !has_other_hash;
+        let is_heard = announced.role != Role::ReaderOfRobots || !(has_other_hash || is_of_gridweave(&there.enclave));
         let (reader, writer) = if entity.is_writer() { (there, here) } else { (here, there) };
         let policies = reader.policies.mismatches(&writer.policies);
         if has_other_type || !policies.is_empty() {

@@ -26,7 +26,8 @@ fn a_robot_on_both_middlewares_is_heard_once() {
     };
     let wires = [(OccupancyGrid::NAME, "/robot1/map"), (PoseStamped::NAME, "/robot1/pose")].map(wire);
     let context = Context { stage: "slam".into(), inputs: wires.to_vec(), ..Default::default() };
-    let mut robot = StageHarness::with_context(&sink::kind(), &parameters, &context).unwrap();
+    let mut robot =
+        StageHarness::with_context(&sink::kind(), &format!("{parameters}\nas_robot = true"), &context).unwrap();
     give(&mut robot, 0, "/robot1/map", map(20, 1));
     let pose = |number: u32| {
         let mut pose = PoseStamped::default();

@@ -3,7 +3,7 @@
 use gridweave_ros::{sink, source};
 use gridweave_runtime::message::{FixedText, LogTime, Message, MessageFlags, MessageHeader};
 use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, PoseStamped, encode};
-use gridweave_runtime::stage::{Context, InputWire, StageHarness};
+use gridweave_runtime::stage::{Context, InputWire, RunLinks, StageHarness};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
@@ -35,6 +35,23 @@ impl Domain {
 
     /// A node that publishes messages of these types on these topics, as a robot or a viewer's peer.
     pub(crate) fn sink(&self, node: &str, wires: &[(&'static str, &str)]) -> StageHarness {
+        self.sink_with(&format!("node = \"{node}\"\nas_robot = true"), wires, None)
+    }
+
+    /// The node of another run of Gridweave that publishes these.
+    pub(crate) fn other_run(&self, node: &str, wires: &[(&'static str, &str)]) -> StageHarness {
+        // A stage with links is in a process of its own, and its run is the process that has started it.
+        let links = RunLinks::new([], |_| Ok(None));
+        self.sink_with(&format!("node = \"{node}\""), wires, Some(links))
+    }
+
+    /// A node of this run, or of the run with these links.
+    pub(crate) fn sink_with(
+        &self,
+        parameters: &str,
+        wires: &[(&'static str, &str)],
+        links: Option<RunLinks>,
+    ) -> StageHarness {
         let wire = |(ros_type, topic): &(&str, &str)| InputWire {
             port: "in",
             from: "a".into(),
@@ -42,8 +59,9 @@ impl Domain {
             topic: (*topic).to_owned(),
             ..Default::default()
         };
-        let context = Context { stage: "ros".into(), inputs: wires.iter().map(wire).collect(), ..Default::default() };
-        let parameters = format!("{}\nnode = \"{node}\"", self.parameters());
+        let inputs = wires.iter().map(wire).collect();
+        let context = Context { stage: "ros".into(), inputs, links, ..Default::default() };
+        let parameters = format!("{}\n{parameters}", self.parameters());
         StageHarness::with_context(&sink::kind(), &parameters, &context).unwrap()
     }
 }

@@ -27,6 +27,63 @@ fn a_topic_of_another_type_is_told_and_the_others_are_heard() {
 }
 
 #[test]
+fn what_gridweave_publishes_is_no_map_of_a_robot() {
+    let domain = Domain::new();
+    let mut source = domain.source("");
+    let wires = [(OccupancyGrid::NAME, "/fleet/map")];
+    // Of this run, and of another one.
+    let mut runs = [domain.sink_with("node = \"merger\"", &wires, None), domain.other_run("other", &wires)];
+    runs.iter_mut().for_each(|run| give(run, 0, "/fleet/map", map(20, 1)));
+    let mut same_topic = domain.other_run("same_topic", &[(OccupancyGrid::NAME, "/robot1/map")]);
+    give(&mut same_topic, 0, "/robot1/map", map(40, 1));
+    let text = warned(&mut source, "`/fleet/map`");
+    assert!(text.contains("another run of Gridweave") && text.contains("/other"), "{text}");
+    // What they have sent would have come before.
+    let mut robot = domain.sink("slam", &[(OccupancyGrid::NAME, "/robot1/map")]);
+    give(&mut robot, 0, "/robot1/map", map(20, 1));
+    for value in 2..5 {
+        for message in sent(&mut source, "map", 1) {
+            let grid: OccupancyGrid<'_> = message.decode().unwrap();
+            assert_eq!((message.robot(), grid.info.width), ("robot1", 20));
+        }
+        give(&mut robot, 0, "/robot1/map", map(20, value));
+    }
+    assert_eq!(source.warnings().len(), 2, "{:?}", source.warnings());
+
+    let text = doctor(&domain, "robot1 has a map");
+    assert!(!text.contains("fleet has") && text.contains("`/fleet/map` of /other is a map"), "{text}");
+}
+
+#[test]
+fn a_second_run_that_publishes_the_same_is_told_by_name() {
+    let domain = Domain::new();
+    let wires = [(OccupancyGrid::NAME, "/map")];
+    let mut other = domain.other_run("other", &wires);
+    give(&mut other, 0, "/map", map(20, 1));
+    let mut sink = domain.sink_with("", &wires, None);
+    let until = std::time::Instant::now() + crate::domain::WATCHDOG;
+    while sink.warnings().is_empty() {
+        assert!(std::time::Instant::now() < until, "there is no warning");
+        give(&mut sink, 0, "/map", map(20, 2));
+        std::thread::yield_now();
+    }
+    give(&mut sink, 0, "/map", map(20, 3));
+    let warnings: Vec<(String, u64)> = sink.warnings().into_iter().collect();
+    let [(text, 1)] = warnings.as_slice() else { panic!("{warnings:?}") };
+    assert!(text.contains("/other of another run of Gridweave publishes `/map`, too"), "{text}");
+}
+
+#[test]
+fn maps_that_fit_no_robot_are_told_with_what_to_write() {
+    let domain = Domain::new();
+    let mut source = domain.source("discovery_timeout = 0.2");
+    let mut robot = domain.sink("slam", &[(OccupancyGrid::NAME, "/map")]);
+    give(&mut robot, 0, "/map", map(20, 1));
+    let text = warned(&mut source, "no robot publishes a map on `/{robot}/map`");
+    assert!(text.contains("-r /map:=map") && text.contains("/slam"), "{text}");
+}
+
+#[test]
 fn a_domain_with_nobody_in_it_is_told() {
     let domain = Domain::new();
     let mut source = domain.source("discovery_timeout = 0.2");
@@ -63,7 +120,7 @@ fn the_doctor_says_who_publishes_what_and_what_is_missing_for_a_merge() {
     let mut second = domain.sink("slam_b", &[(OccupancyGrid::NAME, "/robot2/map")]);
     give(&mut second, 0, "/robot2/map", map(20, 1));
     let text = doctor(&domain, "robot2 has a map");
-    assert!(text.contains("gridweave-ros run live_ros.toml"), "{text}");
+    assert!(text.contains("gridweave-ros run live_ros"), "{text}");
 }
 
 #[test]

@@ -65,7 +65,7 @@ fn warned(source: &mut StageHarness, of: &str) -> String {
     }
 }
 
-/// A sink with wires that carry messages of these types on these topics.
+/// A sink of this run with wires that carry messages of these types on these topics.
 pub(crate) fn sink(parameters: &str, wires: &[(&'static str, &str)]) -> StageHarness {
     let wire = |(ros_type, topic): &(&str, &str)| InputWire {
         port: "in",
@@ -156,7 +156,7 @@ fn what_cannot_be_taken_is_told_and_the_rest_goes_on() {
     other.type_hash = format!("RIHS01_{}", "0".repeat(64));
     let _others = robot.publish(&other, Qos::latched(1));
     let text = warned(&mut source, "another definition");
-    assert!(text.contains("/robot1/map") && text.contains(&other.type_hash), "{text}");
+    assert!(text.contains("RIHS01_00000000 there"), "{text}");
 
     let mut wrong = robot.publish(&topic("/robot2/map", PoseStamped::NAME), Qos::latched(1));
     wrong.send(&[0, 1, 0, 0]);
@@ -236,9 +236,9 @@ fn programs_that_ask_see_the_node_and_its_topics() {
     give(&mut sink, 0, "/markers/graph", encode(&MarkerArray::default()).unwrap());
     let viewer = Robot::start(&router, "viewer");
     let graph = topic("/markers/graph", MarkerArray::NAME).type_hash;
-    viewer.wait_for_token("/0/0/NN/%/%/gridweave_ros");
+    viewer.wait_for_token("/%/gridweave_ros");
     viewer.wait_for_token(&format!(
-        "/0/1/MP/%/%/gridweave_ros/%markers%graph/visualization_msgs::msg::dds_::MarkerArray_/{graph}/:1:,1:,:,:,,"
+        "/%/gridweave_ros/%markers%graph/visualization_msgs::msg::dds_::MarkerArray_/{graph}/:1:,1:,:,:,,"
     ));
 }
 

@@ -83,6 +83,7 @@ impl Robot {
             session: session.zid().to_string(),
             node_number: 0,
             number: 0,
+            enclave: "/".into(),
             namespace: "/".into(),
             node: name.into(),
             kind: Kind::Node,
