@@ -40,9 +40,9 @@ impl Connection {
             name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') && name.chars().all(is_part)
         };
         let mut errors = Vec::new();
-        match self.domain() {
+        match self.find_domain() {
             // Stages fail with the same, and where they start again, again and again.
-            Err(error) => errors.push(ParameterError::new("domain", format!("cannot be found: {error}"))),
+            Err(wrong) => errors.push(ParameterError::new("domain", format!("is not given, and {wrong}"))),
             Ok(domain) if domain > LAST_DOMAIN && self.middleware.has(Middleware::Dds) => {
                 let of = if self.domain.is_none() { format!(", of {DOMAIN_VARIABLE},") } else { String::new() };
                 errors.push(ParameterError::new(
@@ -72,6 +72,10 @@ impl Connection {
     /// # Errors
     /// The environment says something that is no number.
     pub(crate) fn domain(&self) -> Result<u32, StageError> {
+        self.find_domain().map_err(|wrong| StageError::new("find the ROS domain", wrong))
+    }
+
+    fn find_domain(&self) -> Result<u32, String> {
         domain_of(self.domain, &std::env::var(DOMAIN_VARIABLE).unwrap_or_default())
     }
 
@@ -122,15 +126,12 @@ impl Connection {
     }
 }
 
-/// The domain that is given or, if none is, that of the environment.
-fn domain_of(given: Option<u32>, of_environment: &str) -> Result<u32, StageError> {
+/// The domain that is given or, if none is, that of the environment. An error says why that is none.
+fn domain_of(given: Option<u32>, of_environment: &str) -> Result<u32, String> {
     match (given, of_environment.trim()) {
         (Some(domain), _) => Ok(domain),
         (None, "") => Ok(0),
-        (None, text) => text.parse().map_err(|_| {
-            StageError::new("find the ROS domain", format!("{DOMAIN_VARIABLE} is `{text}`"))
-                .with_help("it must be a whole number; `domain` in the pipeline stands in for it")
-        }),
+        (None, text) => text.parse().map_err(|_| format!("{DOMAIN_VARIABLE} is `{text}`, and no whole number")),
     }
 }
 
@@ -161,7 +162,7 @@ mod tests {
             [Some(0), Some(5), Some(7)]
         );
         for text in ["abc", "-1", "1.5"] {
-            assert!(domain_of(None, text).is_err_and(|error| error.to_string().contains(text)), "{text}");
+            assert!(domain_of(None, text).is_err_and(|error| error.contains(text)), "{text}");
         }
     }
 }

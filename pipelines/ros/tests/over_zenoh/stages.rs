@@ -102,6 +102,21 @@ fn a_map_that_was_sent_before_comes_and_those_after_it_too() {
 }
 
 #[test]
+fn what_gridweave_publishes_is_no_map_of_a_robot() {
+    let router = Router::start();
+    let mut merged = sink(&router.parameters(), &[(OccupancyGrid::NAME, "/fleet/map")]);
+    give(&mut merged, 0, "/fleet/map", map("", 1));
+    let mut source = source(&router);
+    let robot = Robot::start(&router, "slam_toolbox");
+    let mut maps = robot.publish(&topic("/robot1/map", OccupancyGrid::NAME), Qos::latched(1));
+    for value in 1..4 {
+        give(&mut merged, 0, "/fleet/map", map("", value));
+        maps.send(&map("", value));
+        assert!(sent(&mut source, "map", 1).iter().all(|message| message.robot() == "robot1"));
+    }
+}
+
+#[test]
 fn a_robot_that_comes_late_and_one_that_comes_again_are_heard() {
     let router = Router::start();
     let mut source = source(&router);
