@@ -65,14 +65,13 @@ impl Findings {
             let wrong = others.iter().filter(|of| !is_map(of));
             self.wrong_types.extend(wrong.map(|of| (name.to_owned(), of.ros_type.clone())));
         }
-        // A node on both middlewares is one.
-        let mut nodes = Vec::new();
-        for published in others.iter().filter(|of| is_map(of)) {
-            let before = others.iter().take_while(|of| !std::ptr::eq(**of, *published));
-            let is_twice = |node: &&String| {
-                !before.clone().any(|of| of.middleware != published.middleware && of.nodes.contains(node))
+        let mut nodes = Vec::<String>::new();
+        for (at, published) in others.iter().enumerate().filter(|(_, of)| is_map(of)) {
+            // A node on both middlewares is one.
+            let is_known = |node: &String| {
+                others[..at].iter().any(|of| of.middleware != published.middleware && of.nodes.contains(node))
             };
-            nodes.extend(published.nodes.iter().filter(is_twice).cloned());
+            nodes.extend(published.nodes.iter().filter(|node| !is_known(node)).cloned());
         }
         match robot {
             _ if nodes.is_empty() => {}
@@ -143,6 +142,11 @@ impl Findings {
     /// What to write so that the nodes that publish one map for all publish it for their robots.
     fn about_shared(&self, topic: &str, nodes: &[String]) -> String {
         let (name, who) = (topic.trim_start_matches('/'), list(nodes));
+        if nodes.iter().all(|node| node.ends_with("map_server")) {
+            return format!(
+                "`{topic}` of {who} is a map that was made before: robots that localise in it have one frame, and nothing to merge"
+            );
+        }
         let namespaces: BTreeSet<&str> = nodes.iter().filter_map(|node| namespace(node)).collect();
         let remap = format!("-r {topic}:={name}");
         // As slam_toolbox has them from the root on, too.
@@ -233,6 +237,11 @@ mod tests {
             &[("/", "slam_toolbox", "/map", MAP)],
             &["`/map` is published by /slam_toolbox", "namespace of its own", "-r /map:=map -r", "-r /tf:=tf"],
         );
+    }
+
+    #[test]
+    fn robots_that_localise_in_one_map_have_nothing_to_merge() {
+        advised(&[("/", "map_server", "/map", MAP)], &["`/map` of /map_server", "nothing to merge"]);
     }
 
     #[test]

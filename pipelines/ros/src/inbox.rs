@@ -9,7 +9,7 @@ use std::time::Duration;
 /// A received event.
 pub(crate) enum Event<M> {
     /// A publisher, subscriber or node has appeared (or disappeared).
-    Entity(Middleware, Entity, bool),
+    Entity(Middleware, Box<Entity>, bool),
     /// A message on the topic with the given index.
     Message { topic: usize, message: M, arrived: i64 },
 }

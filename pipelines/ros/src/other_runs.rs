@@ -44,7 +44,7 @@ impl OtherRuns {
         }
         let text = |(node, topics): (&&String, &Vec<String>)| {
             format!(
-                "{node} of another run of Gridweave publishes what this run does, {} and what follows, or it has ended without notice: who \
+                "{node} of another run of Gridweave publishes what this run publishes, at first {}, or it has ended without notice: who \
                  subscribes gets now the one, now the other. End one of the runs, or give one another `domain`, or other topics by \
                  `rename`",
                 list(topics)
@@ -83,7 +83,7 @@ mod tests {
         assert!(others.warnings(|topic| topic == "/map_conflicts").is_empty());
         let texts = others.warnings(|topic| topic.starts_with("/map"));
         assert!(
-            texts.len() == 1 && texts[0].contains("/gridweave_ros of another") && texts[0].contains("`/map` and what"),
+            texts.len() == 1 && texts[0].contains("/gridweave_ros of another") && texts[0].contains("at first `/map`"),
             "{texts:?}"
         );
         assert!(others.warnings(|_| true).is_empty());

@@ -41,7 +41,7 @@ impl OwnName {
 
     /// The same node, which Gridweave takes for one of a robot.
     #[must_use]
-    pub(crate) fn as_robot(self) -> Self {
+    pub(crate) fn into_robot(self) -> Self {
         Self { enclave: "/".to_owned(), ..self }
     }
 
@@ -101,7 +101,7 @@ mod tests {
         assert!(!source.enclave.ends_with('_'), "{}", source.enclave);
         assert_eq!(source.owner(&entity(&sink.enclave)), Owner::ThisRun);
         assert_eq!(source.owner(&entity(&OwnName::new("ros", None, 1).enclave)), Owner::OtherRun);
-        assert_eq!(source.owner(&entity(&sink.as_robot().enclave)), Owner::Other);
+        assert_eq!(source.owner(&entity(&sink.into_robot().enclave)), Owner::Other);
         assert_eq!(source.owner(&entity("")), Owner::Other);
     }
 }

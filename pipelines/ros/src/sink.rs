@@ -153,7 +153,7 @@ impl RosSink {
         let doing = || format!("make the stage `{}`", context.stage);
         let renames = parameters.renames().map_err(|wrong| StageError::new(doing(), wrong))?;
         let name = OwnName::of_stage(context, parameters.node.as_ref());
-        let name = if parameters.as_robot { name.as_robot() } else { name };
+        let name = if parameters.as_robot { name.into_robot() } else { name };
         let node = Node::start(parameters.connection(), name)?;
         Ok(Self {
             other_runs: OtherRuns::watch(&node)?,

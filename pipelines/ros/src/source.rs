@@ -76,7 +76,7 @@ impl RosSource {
         let inbox = Arc::new(Inbox::default());
         let events = Arc::clone(&inbox);
         let reading = RobotReading { map_values: parameters.map_values, lidars: parameters.lidars };
-        node.watch(move |on, entity, is_there| events.push(Event::Entity(on, entity, is_there), 0))?;
+        node.watch(move |on, entity, is_there| events.push(Event::Entity(on, Box::new(entity), is_there), 0))?;
         Ok(Self {
             node,
             inbox,
@@ -359,7 +359,7 @@ impl Source for RosSource {
         for _ in 0..BATCH {
             match self.inbox.take() {
                 None => break,
-                Some(Event::Entity(on, entity, is_there)) => self.note_entity(on, entity, is_there, output)?,
+                Some(Event::Entity(on, entity, is_there)) => self.note_entity(on, *entity, is_there, output)?,
                 Some(Event::Message { topic, message, arrived }) => {
                     self.take_message(topic, &message, arrived, output)?;
                 }

@@ -70,7 +70,10 @@ fn a_second_run_that_publishes_the_same_is_told_by_name() {
     give(&mut sink, 0, "/map", map(20, 3));
     let warnings: Vec<(String, u64)> = sink.warnings().into_iter().collect();
     let [(text, 1)] = warnings.as_slice() else { panic!("{warnings:?}") };
-    assert!(text.contains("/other of another run of Gridweave publishes what this run does, `/map` and"), "{text}");
+    assert!(
+        text.contains("/other of another run of Gridweave publishes what this run publishes, at first `/map`"),
+        "{text}"
+    );
 }
 
 #[test]
