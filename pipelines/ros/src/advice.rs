@@ -2,6 +2,7 @@
 //! `doctor`, and for a run that finds no robot.
 
 use super::census::{Published, Topics};
+use super::middleware::Middleware;
 use super::own_name::Owner;
 use gridweave_logs::names::rename_advice;
 use gridweave_runtime::ros::{LaserScan, MultiEchoLaserScan, OccupancyGrid, Odometry, RosMessage, TFMessage};
@@ -20,7 +21,7 @@ pub(crate) struct Findings {
     /// Maps on other topics, with their nodes.
     elsewhere: BTreeMap<String, Vec<String>>,
     /// The maps that runs of Gridweave publish, with their nodes.
-    pub(crate) merged: BTreeSet<(String, String)>,
+    pub(crate) merged: BTreeMap<String, Vec<String>>,
 }
 
 impl Findings {
@@ -32,7 +33,7 @@ impl Findings {
             scanning: BTreeMap::new(),
             wrong_types: BTreeSet::new(),
             elsewhere: BTreeMap::new(),
-            merged: BTreeSet::new(),
+            merged: BTreeMap::new(),
         };
         for (name, of_topic) in topics {
             findings.note_maps(name, of_topic);
@@ -57,28 +58,22 @@ impl Findings {
     fn note_maps(&mut self, name: &str, of_topic: &[Published]) {
         let is_map = |of: &&Published| of.ros_type == OccupancyGrid::NAME;
         let robot = match_robot(&self.pattern, name);
-        for published in of_topic.iter().filter(|of| of.owner != Owner::Other && is_map(of)) {
-            self.merged.extend(published.nodes.iter().map(|node| (name.to_owned(), node.clone())));
-        }
-        let others: Vec<&Published> = of_topic.iter().filter(|of| of.owner == Owner::Other).collect();
+        let (others, runs): (Vec<&Published>, Vec<&Published>) =
+            of_topic.iter().partition(|of| of.owner == Owner::Other);
         if robot.is_some() {
             let wrong = others.iter().filter(|of| !is_map(of));
             self.wrong_types.extend(wrong.map(|of| (name.to_owned(), of.ros_type.clone())));
         }
-        let mut nodes = Vec::<String>::new();
-        for (at, published) in others.iter().enumerate().filter(|(_, of)| is_map(of)) {
-            // A node on both middlewares is one.
-            let is_known = |node: &String| {
-                others[..at].iter().any(|of| of.middleware != published.middleware && of.nodes.contains(node))
-            };
-            nodes.extend(published.nodes.iter().filter(|node| !is_known(node)).cloned());
+        let [others, runs] = [others, runs].map(|all| nodes(all.into_iter().filter(is_map)));
+        if !runs.is_empty() {
+            self.merged.insert(name.to_owned(), runs);
         }
         match robot {
-            _ if nodes.is_empty() => {}
-            Some(robot) => _ = self.maps.insert(robot.to_owned(), nodes),
+            _ if others.is_empty() => {}
+            Some(robot) => _ = self.maps.insert(robot.to_owned(), others),
             // A costmap is made of a map, and is none.
             None if name.contains("costmap") => {}
-            None => _ = self.elsewhere.insert(name.to_owned(), nodes),
+            None => _ = self.elsewhere.insert(name.to_owned(), others),
         }
     }
 
@@ -167,6 +162,17 @@ impl Findings {
     }
 }
 
+/// The nodes that publish these, of which one on both middlewares is one.
+fn nodes<'a>(published: impl Iterator<Item = &'a Published>) -> Vec<String> {
+    let mut nodes = Vec::<(Middleware, String)>::new();
+    for of in published {
+        let is_known = |node: &String| nodes.iter().any(|(on, known)| *on != of.middleware && known == node);
+        let more: Vec<_> = of.nodes.iter().filter(|node| !is_known(node)).cloned().collect();
+        nodes.extend(more.into_iter().map(|node| (of.middleware, node)));
+    }
+    nodes.into_iter().map(|(_, node)| node).collect()
+}
+
 /// Whether a map bears the name of no robot: of several nodes, or of one.
 fn is_shared(topic: &str, nodes: &[String]) -> bool {
     topic == "/map" || nodes.len() > 1
@@ -190,7 +196,6 @@ pub(crate) fn list<T: ToString>(names: impl IntoIterator<Item = T>) -> String {
 mod tests {
     use super::super::census::Census;
     use super::super::census::tests::publisher;
-    use super::super::middleware::Middleware;
     use super::*;
 
     /// What is found where these nodes, each with its namespace, publish.
@@ -221,7 +226,7 @@ mod tests {
     fn a_map_of_gridweave_is_none_of_a_robot() {
         let findings = found(&[("/", "gridweave_ros", "/fleet/map", MAP), ("/robot1", "slam", "/robot1/map", MAP)]);
         assert_eq!(findings.maps, BTreeMap::from([("robot1".to_owned(), vec!["/robot1/slam".to_owned()])]));
-        assert_eq!(findings.merged, BTreeSet::from([("/fleet/map".to_owned(), "/gridweave_ros".to_owned())]));
+        assert_eq!(findings.merged, BTreeMap::from([("/fleet/map".to_owned(), vec!["/gridweave_ros".to_owned()])]));
         assert!(findings.advice(false).is_empty());
     }
 

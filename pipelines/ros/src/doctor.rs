@@ -102,8 +102,16 @@ fn write_topics(text: &mut String, topics: &Topics, definitions: &Definitions) -
 
 /// Says which robots have a map, what is missing for a merge, and what to write.
 fn write_robots(text: &mut String, findings: &Findings, hearing: &Hearing, robots: &RobotTopics) -> std::fmt::Result {
-    for (topic, node) in &findings.merged {
-        writeln!(text, "`{topic}` of {node} is a map that a run of Gridweave publishes, and no robot's")?;
+    for (topic, nodes) in &findings.merged {
+        match nodes.as_slice() {
+            [node] => writeln!(text, "`{topic}` of {node} is a map that a run of Gridweave publishes, and no robot's")?,
+            all => writeln!(
+                text,
+                "warning: {} runs of Gridweave publish `{topic}`, by {}: end all but one",
+                all.len(),
+                list(all)
+            )?,
+        }
     }
     for (robot, nodes) in &findings.maps {
         let seen = hearing.map(&robots.map.replace("{robot}", robot));

@@ -51,7 +51,10 @@ fn what_gridweave_publishes_is_no_map_of_a_robot() {
     assert_eq!(source.warnings().len(), 2, "{:?}", source.warnings());
 
     let text = doctor(&domain, "robot1 has a map");
-    assert!(!text.contains("fleet has") && text.contains("`/fleet/map` of /other is a map"), "{text}");
+    assert!(
+        !text.contains("fleet has") && text.contains("2 runs of Gridweave publish `/fleet/map`, by /merger and /other"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -67,6 +70,7 @@ fn a_second_run_that_publishes_the_same_is_told_by_name() {
         give(&mut sink, 0, "/map", map(20, 2));
         std::thread::yield_now();
     }
+    doctor(&domain, "2 runs of Gridweave publish `/map`");
     give(&mut sink, 0, "/map", map(20, 3));
     let warnings: Vec<(String, u64)> = sink.warnings().into_iter().collect();
     let [(text, 1)] = warnings.as_slice() else { panic!("{warnings:?}") };
