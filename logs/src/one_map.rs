@@ -9,6 +9,7 @@ use crate::robots::{RobotChannels, Role, fits, is_scan};
 use crate::schemas::full_type_name;
 use crate::tf::tf_topic;
 use gridweave_runtime::message::Channel;
+use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, TFMessage, decode};
 use gridweave_runtime::stage::RobotTopics;
 use std::collections::{BTreeMap, BTreeSet};
@@ -132,11 +133,7 @@ impl OneMap {
 
     /// The finding in a sentence without its end.
     pub(crate) fn sentence(&self) -> String {
-        let robots: Vec<&str> = self.robots.iter().map(String::as_str).collect();
-        let robots = match &robots[..] {
-            [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
-            robots => robots.join(", "),
-        };
+        let robots = list_in_words(&self.robots);
         format!("{robots} localise in one map, `{}`, in frame `{}`", self.topic, self.frame)
     }
 

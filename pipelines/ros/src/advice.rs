@@ -5,6 +5,7 @@ use super::census::{Published, Topics};
 use super::middleware::Middleware;
 use super::own_name::Owner;
 use gridweave_logs::names::rename_advice;
+use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::ros::{LaserScan, MultiEchoLaserScan, OccupancyGrid, Odometry, RosMessage, TFMessage};
 use gridweave_runtime::stage::{RobotTopics, match_robot};
 use std::collections::{BTreeMap, BTreeSet};
@@ -83,13 +84,13 @@ impl Findings {
         if !draws_maps && !self.scanning.is_empty() {
             let mut text = format!(
                 "{} publish{} scans and no map: `gridweave-ros run live_ros_scans` draws maps of scans",
-                list(self.scanning.keys()),
+                list_in_words(self.scanning.keys()),
                 if self.scanning.len() == 1 { "es" } else { "" }
             );
             let unmoved: Vec<&String> =
                 self.scanning.iter().filter(|(_, moves)| !**moves).map(|(name, _)| name).collect();
             if !unmoved.is_empty() {
-                let robots = list(unmoved.iter().copied());
+                let robots = list_in_words(unmoved.iter().copied());
                 text.push_str(&format!("; it needs odometry, poses or tf, too, and finds none of {robots}"));
             }
             advice.push(text);
@@ -112,7 +113,7 @@ impl Findings {
         let advised = rename_advice(all, &self.pattern);
         let template = |option: &String| Some(option.strip_prefix("--rename '")?.split_once('=')?.0.to_owned());
         let template = advised.first().and_then(template).filter(|template| template.contains("{robot}"));
-        let maps = list(self.elsewhere.keys().map(|topic| format!("`{topic}`")));
+        let maps = list_in_words(self.elsewhere.keys().map(|topic| format!("`{topic}`")));
         match template.or_else(|| self.only_template()) {
             Some(template) => Some(format!(
                 "maps are on {maps}: in a copy of the pipeline (`gridweave-ros pipelines live_ros > my.toml`), below [robots], write: \
@@ -136,7 +137,7 @@ impl Findings {
 
     /// What to write so that the nodes that publish one map for all publish it for their robots.
     fn about_shared(&self, topic: &str, nodes: &[String]) -> String {
-        let (name, who) = (topic.trim_start_matches('/'), list(nodes));
+        let (name, who) = (topic.trim_start_matches('/'), list_in_words(nodes));
         if nodes.iter().all(|node| node.ends_with("map_server")) {
             return format!(
                 "`{topic}` of {who} is a map that was made before: robots that localise in it have one frame, and nothing to merge"
@@ -151,7 +152,7 @@ impl Findings {
                 let named = namespaces.iter().map(|namespace| format!("`{namespace}/{name}`"));
                 format!(
                     "`{topic}` is published by {who}: start each with {remap}{more}, and the maps are on {}; two_robots.launch.py does so",
-                    list(named)
+                    list_in_words(named)
                 )
             }
             false => format!(
@@ -181,15 +182,6 @@ fn is_shared(topic: &str, nodes: &[String]) -> bool {
 /// The namespace of a node; `None` for the root.
 fn namespace(node: &str) -> Option<&str> {
     node.rsplit_once('/').map(|(namespace, _)| namespace).filter(|namespace| !namespace.is_empty())
-}
-
-/// Names as a list in words.
-pub(crate) fn list<T: ToString>(names: impl IntoIterator<Item = T>) -> String {
-    let mut names: Vec<String> = names.into_iter().map(|name| name.to_string()).collect();
-    match names.pop() {
-        Some(last) if !names.is_empty() => format!("{} and {last}", names.join(", ")),
-        last => last.unwrap_or_default(),
-    }
 }
 
 #[cfg(test)]

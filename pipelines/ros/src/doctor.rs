@@ -1,6 +1,6 @@
 //! The verb `doctor`: what robots there are on the network, and what is missing for a merge.
 
-use super::advice::{Findings, list};
+use super::advice::Findings;
 use super::census::{Census, Published, Topics};
 use super::definitions::Definitions;
 use super::doctor_hearing::Hearing;
@@ -12,6 +12,7 @@ use super::source_parameters::SourceParameters;
 use anyhow::{Result, bail};
 use gridweave::Verb;
 use gridweave::table::Table;
+use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::stage::{Parameters, RobotTopics};
 use std::fmt::Write;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -109,7 +110,7 @@ fn write_robots(text: &mut String, findings: &Findings, hearing: &Hearing, robot
                 text,
                 "warning: {} runs of Gridweave publish `{topic}`, by {}: end all but one",
                 all.len(),
-                list(all)
+                list_in_words(all)
             )?,
         }
     }
@@ -117,7 +118,7 @@ fn write_robots(text: &mut String, findings: &Findings, hearing: &Hearing, robot
         let seen = hearing.map(&robots.map.replace("{robot}", robot));
         writeln!(text, "{robot} has a map, {seen}{}", hearing.tree(robot))?;
         if nodes.len() > 1 {
-            let (count, nodes) = (nodes.len(), list(nodes));
+            let (count, nodes) = (nodes.len(), list_in_words(nodes));
             writeln!(text, "warning: {robot} has {count} maps, of {nodes}: are there two robots of one name?")?;
         }
     }

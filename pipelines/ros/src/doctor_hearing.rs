@@ -1,11 +1,11 @@
 //! What the doctor hears of the robots: how large their maps are, and in which frames, and where their tf trees begin.
 
-use super::advice::list;
 use super::census::{Published, Topics};
 use super::middleware::Middleware;
 use super::node::{Node, Subscriber};
 use super::own_name::Owner;
 use super::qos::Qos;
+use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::ros::{OccupancyGrid, RosMessage, TFMessage, decode};
 use gridweave_runtime::stage::{RobotTopics, StageError, match_robot};
 use std::collections::{BTreeMap, BTreeSet};
@@ -106,7 +106,7 @@ impl Heard {
     fn roots(&self, namespace: &str) -> Option<String> {
         let [parents, children] = self.frames.get(namespace)?;
         let roots = parents.difference(children).map(|frame| format!("`{frame}`"));
-        Some(list(roots)).filter(|roots| !roots.is_empty())
+        Some(list_in_words(roots)).filter(|roots| !roots.is_empty())
     }
 }
 

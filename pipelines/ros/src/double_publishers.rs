@@ -1,7 +1,7 @@
 //! What to say where several programs publish what belongs to one robot.
 
-use super::advice::list;
 use super::liveliness::Entity;
+use gridweave_runtime::pipeline::list_in_words;
 
 /// What to warn of where these programs publish a topic of one robot.
 pub(crate) fn warning(topic: &str, publishers: &[&Entity]) -> String {
@@ -13,7 +13,7 @@ pub(crate) fn warning(topic: &str, publishers: &[&Entity]) -> String {
         "`{topic}` is published by {} programs at once, {}: are there two robots of one name, or is one of them a program that has ended \
          without notice, which counts until its lease ends? What they say of it is mixed up",
         publishers.len(),
-        list(publishers.iter().map(named))
+        list_in_words(publishers.iter().map(named))
     )
 }
 

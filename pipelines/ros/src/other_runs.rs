@@ -1,9 +1,9 @@
 //! Other runs of Gridweave that publish what this one publishes, too.
 
-use super::advice::list;
 use super::liveliness::{Entity, Kind};
 use super::node::Node;
 use super::own_name::Owner;
+use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::stage::StageError;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -47,7 +47,7 @@ impl OtherRuns {
                 "{node} of another run of Gridweave publishes what this run publishes, at first {}, or it has ended without notice: who \
                  subscribes gets now the one, now the other. End one of the runs, or give one another `domain`, or other topics by \
                  `rename`",
-                list(topics)
+                list_in_words(topics)
             )
         };
         let texts = both.iter().map(text).collect();

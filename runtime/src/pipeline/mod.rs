@@ -86,7 +86,7 @@ pub use diagnostic::PipelineErrors;
 pub use kinds::{kind_json, kind_text, kinds_json, kinds_text};
 pub use link_names::{named_link, named_links};
 pub use live::{Mode, Overflow, Restart};
-pub use nearest::{quoted_list, suggest};
+pub use nearest::{list_in_words, quoted_list, suggest};
 pub use overrides::{Overrides, SettingError};
 pub use parameter_schema::{ParameterInfo, parameters_of};
 pub use settings::{DEFAULT_DEPTH, DEFAULT_SAME_TIME_LIMIT, MAX_DEPTH};

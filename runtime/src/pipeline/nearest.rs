@@ -34,9 +34,31 @@ pub fn quoted_list<S: AsRef<str>>(names: &[S]) -> String {
     list.join(", ")
 }
 
+/// Names as a list in words: "a", "a and b", "a, b and c"; of many the first, and how many others.
+pub fn list_in_words<T: ToString>(names: impl IntoIterator<Item = T>) -> String {
+    const MOST: usize = 6;
+    let mut names: Vec<String> = names.into_iter().map(|name| name.to_string()).collect();
+    if names.len() > MOST {
+        let others = names.split_off(MOST - 2).len();
+        names.push(format!("{others} others"));
+    }
+    match names.pop() {
+        Some(last) if !names.is_empty() => format!("{} and {last}", names.join(", ")),
+        last => last.unwrap_or_default(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_are_listed_in_words_and_many_are_counted() {
+        let names = ["a", "b", "c", "d", "e", "f", "g", "h"];
+        let of = |count: usize| list_in_words(&names[..count]);
+        assert_eq!([of(0), of(1), of(2), of(3)], ["", "a", "a and b", "a, b and c"]);
+        assert_eq!([of(6), of(8)], ["a, b, c, d, e and f", "a, b, c, d and 4 others"]);
+    }
 
     #[test]
     fn a_misspelt_name_is_found() {

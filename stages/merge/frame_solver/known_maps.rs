@@ -1,7 +1,7 @@
 //! What is known of the robots' maps: which can be used, what is wrong with others, and why robots have none.
 
-use super::reasons::list;
 use super::solution::Alignments;
+use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::ros::{Alignment, GridError, Verdict};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -114,7 +114,7 @@ impl KnownMaps {
             let lacking: Vec<String> = lacking.cloned().collect();
             if self.is_over && !*accepted && !lacking.is_empty() {
                 let verb = if lacking.len() == 1 { "has" } else { "have" };
-                *reason = format!("{} {verb} sent no map, and by tags alone: {reason}", list(&lacking));
+                *reason = format!("{} {verb} sent no map, and by tags alone: {reason}", list_in_words(&lacking));
             }
         }
     }

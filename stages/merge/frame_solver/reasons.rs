@@ -3,6 +3,7 @@
 use super::UncertainPose;
 use super::solution::{Alignments, OpenCycle, Solution};
 use crate::shared::robot_pair::RobotPair;
+use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::ros::Alignment;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -20,7 +21,7 @@ fn gap(cycle: &OpenCycle) -> String {
     let pairs: Vec<String> = cycle.pairs.iter().map(|pair| pair.robots().join("-")).collect();
     format!(
         "{} do not close by {:.2} m and {:.1} degrees, {:.0} standard deviations",
-        list(&pairs),
+        list_in_words(&pairs),
         cycle.metres,
         cycle.radians.to_degrees(),
         cycle.deviations
@@ -70,7 +71,7 @@ fn reason(robot: &str, solution: &Solution, refusals: &UnusedAlignments<'_>) -> 
     let known = members.clone().find_map(|member| disputed.get(member).cloned());
     let refused = || members.clone().find_map(|member| refusals.most_informative(member, frames));
     let why = known.or_else(refused).unwrap_or_else(|| "no alignment connects them with a merged robot".into());
-    format!("it is connected with {} only, not with the reference: {why}", list(&others))
+    format!("it is connected with {} only, not with the reference: {why}", list_in_words(&others))
 }
 
 fn no_alignment(robot: &str, frames: &BTreeMap<String, UncertainPose>, refusals: &UnusedAlignments<'_>) -> String {
@@ -130,19 +131,6 @@ impl<'a> UnusedAlignments<'a> {
         let reason = if most_informative.reason.is_empty() { "no reason was given" } else { most_informative.reason };
         // A reason of several lines begins on a line of its own.
         let gap = if reason.contains('\n') { "\n" } else { " " };
-        Some(format!("no alignment with {}:{gap}{reason}", list(&same)))
-    }
-}
-
-/// "a", "a and b", "a, b and c"; of many the first, and how many others.
-pub(super) fn list(names: &[String]) -> String {
-    const MOST: usize = 6;
-    match names {
-        [] => String::new(),
-        [one] => one.clone(),
-        [first @ .., _] if first.len() >= MOST => {
-            format!("{} and {} others", first[..MOST - 2].join(", "), names.len() - (MOST - 2))
-        }
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+        Some(format!("no alignment with {}:{gap}{reason}", list_in_words(&same)))
     }
 }
