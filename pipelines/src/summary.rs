@@ -219,7 +219,7 @@ mod tests {
         };
         let stages =
             vec![stage("maps", &[("it is empty", 1)]), stage("fuser", &[("it is empty", 3), ("it is old", 1)])];
-        let summary = RunSummary::new(None, &RunReport { stages, ..RunReport::default() });
+        let summary = RunSummary::new(None, &RunReport { stages });
         let lines: Vec<String> = summary.warning_lines().collect();
         assert_eq!(lines, ["warning: maps, fuser: it is empty (3 times)", "warning: fuser: it is old (once)"]);
         assert_eq!(summary.warning_texts(), "\n  it is empty\n  it is old");
