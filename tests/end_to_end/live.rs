@@ -3,6 +3,7 @@ use crate::support::{
     Ended, LOG, LogBuilder, OUTPUT, POSES, RECEIVE, Run, TROUBLED, counts, gridweave, processes, read, signal,
     simulate, start, wait_until,
 };
+use gridweave_runtime::ros::{MapMetaData, OccupancyGrid};
 use std::fs;
 use tempfile::TempDir;
 
@@ -33,6 +34,20 @@ fn maps_without_tags_are_merged_live() {
     done.assert_done();
     done.ended.assert(0, &["merged 2 of 2 robots"]);
     done.assert_right(&truth);
+}
+
+#[test]
+fn warnings_are_logged_while_the_run_goes_on() {
+    let run = Run::start("live_merge", &[]);
+    let mut log = LogBuilder::new(&run.path(LOG));
+    let info = MapMetaData { resolution: 0.05, width: 10, height: 10, ..MapMetaData::default() };
+    let grid = OccupancyGrid { info, data: &[0; 50], ..OccupancyGrid::default() };
+    log.message(1.0, "/robot1/map", &grid).message(2.0, "/robot1/map", &grid);
+    log.finish();
+    run.command(&["play", LOG, "--rate", "0"]).wait().assert(0, &["into live_merge"]);
+    let done = run.interrupt();
+    let stderr = &done.ended.stderr;
+    assert_eq!(stderr.matches("maps: a map of robot1 was left out").count(), 1, "{stderr}");
 }
 
 #[test]

@@ -57,7 +57,7 @@ impl Slice {
     /// points are in the frame of the base.
     ///
     /// # Errors
-    /// The points cannot be read.
+    /// The points cannot be read, or none is in the slice.
     pub(crate) fn of(
         cloud: &PointCloud2<'_>,
         rotation: &UnitQuaternion<f64>,
@@ -79,6 +79,9 @@ impl Slice {
                 *of_direction = Nearest { squared, time: time() };
             }
         });
+        if nearest.iter().all(|point| point.squared.is_infinite()) {
+            return Err(CloudFault::NoWalls(heights, if is_base { "base" } else { "lidar" }));
+        }
         let measured = nearest.iter().enumerate().filter_map(|(place, point)| Some((point.time?, angle(place))));
         Ok(match Sweep::of(measured.collect()) {
             Some(sweep) => Self::in_order(&nearest, &sweep, LogTime::from(cloud.header.stamp).seconds()),
@@ -226,7 +229,7 @@ mod tests {
             PointCloud2 { height: 0, ..good.clone() },
             PointCloud2 { height: u32::MAX, width: 0, row_step: 0, data: &[], ..good },
         ] {
-            assert_eq!(found(&of(empty).unwrap()), []);
+            assert_eq!(of(empty), Err(CloudFault::NoWalls(ABOVE_LIDAR, "lidar")));
         }
     }
 

@@ -26,7 +26,9 @@ use gridweave_runtime::ros::{
     OccupancyGrid, PoseWithCovarianceStamped, RangeScan, TagBearing, TagPosition, TagRange, TopologicalMap,
     UnmergedRobot,
 };
-use gridweave_runtime::stage::{AnyMessage, Out, OutputPorts, Outputs, ParameterError, Parameters, StageKind};
+use gridweave_runtime::stage::{
+    AnyMessage, InitialPose, Out, OutputPorts, Outputs, ParameterError, Parameters, StageKind,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -102,9 +104,13 @@ impl Parameters for SourceParameters {
         if self.end.is_some_and(|end| end <= self.start) {
             errors.push(ParameterError::new("end", "must be later than `start`"));
         }
-        if self.lidars.values().any(|pose| !matches!(pose.len(), 3 | 4) || pose.iter().any(|value| !value.is_finite()))
-        {
-            errors.push(ParameterError::new("lidars", "must be [X, Y, YAW] or [X, Y, YAW, ROLL] for each robot"));
+        let is_place = |pose: &Vec<f64>| {
+            let is_angle = |angle: &f64| angle.abs() <= InitialPose::FULL_TURN;
+            matches!(pose.len(), 3 | 4) && pose.iter().all(|value| value.is_finite()) && pose[2..].iter().all(is_angle)
+        };
+        if !self.lidars.values().all(is_place) {
+            let form = "must be [X, Y, YAW] or [X, Y, YAW, ROLL] for each robot, in metres and radians (90 degrees are 1.5708)";
+            errors.push(ParameterError::new("lidars", form));
         }
         errors
     }

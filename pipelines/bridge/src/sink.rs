@@ -239,7 +239,7 @@ impl BridgeSink {
             let seconds = self.linger.as_secs_f64();
             let text = format!("the other end of the bridge has not acknowledged the end within {seconds} s");
             tracing::warn!("{text}; {messages} messages were not acknowledged");
-            output.warn(text);
+            output.warn_logged(text);
             output.count("messages that were not acknowledged before the end", messages as u64);
         }
         Ok(())
@@ -267,6 +267,6 @@ impl BridgeSink {
         if now.superseded > before.superseded {
             output.warn("only the last of the pending maps were sent, as the receiver was restarted");
         }
-        self.sender.take_notices().into_iter().for_each(|notice| output.warn(notice));
+        self.sender.take_notices().into_iter().for_each(|notice| output.warn_logged(notice));
     }
 }

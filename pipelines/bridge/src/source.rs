@@ -357,7 +357,7 @@ pub(super) fn channel_of(topic: &str, ros_type: &str, definition: &str) -> Chann
 
 fn warn(output: &Output<Ports>, text: String) {
     tracing::warn!("{text}");
-    output.warn(text);
+    output.warn_logged(text);
 }
 
 impl Source for BridgeSource {

@@ -169,7 +169,7 @@ impl RosSink {
     }
 
     fn receive(&mut self, message: &Message, output: &Output<()>) -> Result<(), StageError> {
-        self.node.take_problems().into_iter().for_each(|problem| output.warn(problem));
+        self.node.take_problems().into_iter().for_each(|problem| output.warn_logged(problem));
         self.check_other_runs(output);
         let ros_type = self.types.get(message.wire()).cloned().unwrap_or_default();
         let topic = message.header().topic.as_str().to_owned();
@@ -203,10 +203,7 @@ impl RosSink {
         let (publishers, maps) = (&self.publishers, &self.maps);
         let is_published =
             |topic: &str| publishers.contains_key(topic) || maps.as_ref().is_some_and(|maps| maps.has(topic));
-        for text in self.other_runs.warnings(is_published) {
-            tracing::warn!("{text}");
-            output.warn(text);
-        }
+        self.other_runs.warnings(is_published).into_iter().for_each(|text| output.warn(text));
     }
 
     /// Publishes a map, or an update of its changed part.

@@ -284,16 +284,13 @@ impl RosSource {
         let of_name = self.topics.iter().filter(|(other, _)| is_same(other));
         let publishers: Vec<&Entity> = of_name.flat_map(|(_, seen)| &seen.publishers).collect();
         if publishers.len() > 1 {
-            let text = double_publishers::warning(name, &publishers);
-            tracing::warn!("{text}");
-            output.warn(text);
+            output.warn(double_publishers::warning(name, &publishers));
         }
     }
 
-    /// Warns at once, and counts the warning, but only the first time.
+    /// Warns, but only the first time.
     fn warn_once(&mut self, text: String, output: &Output<RobotMessages>) {
         if self.warned.insert(text.clone()) {
-            tracing::warn!("{text}");
             output.warn(text);
         }
     }
@@ -338,7 +335,7 @@ impl RosSource {
     /// Warns of a domain in which nobody is heard, and of what other nodes do wrong.
     fn check_network(&mut self, output: &Output<RobotMessages>) {
         // They were logged already.
-        self.node.take_problems().into_iter().for_each(|problem| output.warn(problem));
+        self.node.take_problems().into_iter().for_each(|problem| output.warn_logged(problem));
         let hears_any = !self.subscribers.is_empty() || !self.waiting_scans.is_empty();
         let texts =
             [self.silence.warning(&self.node), self.silence.misfit(&self.robots, [hears_any, output.takes_scans()])];

@@ -84,6 +84,13 @@ impl Runner {
         self.node.warning_count()
     }
 
+    /// Logs the warnings whose texts are new since the last call.
+    pub(super) fn log_warnings(&self) {
+        for what in self.node.take_unlogged() {
+            tracing::warn!("{}: {what}", self.report.name);
+        }
+    }
+
     /// The share of its work that a source has done.
     pub(super) fn progress(&self) -> Result<Option<f64>, Failure> {
         guarded(|| Ok(self.node.progress()))

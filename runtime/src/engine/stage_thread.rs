@@ -302,8 +302,12 @@ impl<'a, S: Service + 'static> StageThread<'a, S> {
         })
     }
 
-    /// Publishes the progress of the stage in its counters.
+    /// Publishes the progress of the stage in its counters, and in a live run its warnings in the log: nobody waits for the
+    /// summary.
     fn update_counters(&self) {
+        if self.order == Order::Arrival {
+            self.runner.log_warnings();
+        }
         self.counters.set(StageCounter::Warnings, self.runner.warnings());
         for (wire, queue) in self.queues.iter().enumerate() {
             self.counters.set_wire(wire, WireCounter::Waiting, queue.len() as u64);

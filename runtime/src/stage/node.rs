@@ -125,6 +125,11 @@ impl Node {
         self.sent.warnings()
     }
 
+    /// Takes the texts of warnings that have not been logged.
+    pub fn take_unlogged(&self) -> Vec<String> {
+        self.sent.take_unlogged()
+    }
+
     /// The number of all warnings.
     pub fn warning_count(&self) -> u64 {
         self.sent.warning_count()

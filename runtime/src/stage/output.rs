@@ -70,6 +70,8 @@ pub struct OutputEnd {
 struct OutputState {
     log_time: Cell<LogTime>,
     warnings: RefCell<BTreeMap<String, u64>>,
+    /// The texts of warnings that have not been logged.
+    unlogged: RefCell<Vec<String>>,
     counts: RefCell<BTreeMap<&'static str, u64>>,
 }
 
@@ -185,6 +187,11 @@ impl SentCounts {
         self.state.warnings.borrow().clone()
     }
 
+    /// Takes the texts of warnings that have not been logged.
+    pub(super) fn take_unlogged(&self) -> Vec<String> {
+        self.state.unlogged.take()
+    }
+
     pub(super) fn warning_count(&self) -> u64 {
         self.state.warnings.borrow().values().sum()
     }
@@ -221,8 +228,17 @@ impl<O> Output<O> {
     }
 
     /// Counts a warning: a problem with the input that the stage can continue with, such as "readings before the first
-    /// pose". The summary of the run shows every text with its count.
+    /// pose". The summary of the run shows every text with its count; a live run also logs each text at once.
     pub fn warn(&self, what: impl Into<String>) {
+        let what = what.into();
+        if !self.state.warnings.borrow().contains_key(&what) {
+            self.state.unlogged.borrow_mut().push(what.clone());
+        }
+        self.warn_logged(what);
+    }
+
+    /// Counts a warning that has been logged already.
+    pub fn warn_logged(&self, what: impl Into<String>) {
         *self.state.warnings.borrow_mut().entry(what.into()).or_default() += 1;
     }
 

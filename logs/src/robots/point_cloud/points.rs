@@ -3,14 +3,15 @@
 use gridweave_runtime::ros::{PointCloud2, PointField};
 use nalgebra::Vector3;
 use std::fmt;
+use std::ops::RangeInclusive;
 
 /// Fields with the time of a point, as drivers name them: after the stamp, or since 1970.
 const TIMES: [&str; 6] = ["t", "time", "timestamp", "time_stamp", "offset_time", "time_offset"];
 /// Integer times are in this unit, seconds; others are in seconds.
 const NANOSECOND: f64 = 1e-9;
 
-/// Why the points of a cloud cannot be read.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Why a cloud gives no scan.
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) enum CloudFault {
     /// There is no such field of one floating-point number.
     Field(&'static str),
@@ -18,6 +19,8 @@ pub(crate) enum CloudFault {
     Short,
     /// The points are in this frame, which does not move with the robot.
     Fixed(String),
+    /// No point is at these heights (metres) above the lidar or above the base.
+    NoWalls(RangeInclusive<f64>, &'static str),
 }
 
 impl fmt::Display for CloudFault {
@@ -29,6 +32,12 @@ impl fmt::Display for CloudFault {
                 f,
                 "its points are in `{frame}`, which does not move with the robot; give a topic with the points as the \
                  lidar measured them"
+            ),
+            Self::NoWalls(heights, of) => write!(
+                f,
+                "none of its points is from {} to {} m above the {of}, where walls are looked for; is its frame right?",
+                heights.start(),
+                heights.end()
             ),
         }
     }

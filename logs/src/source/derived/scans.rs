@@ -80,7 +80,7 @@ impl DerivedScans {
             Ok(scan) => output.scans.send(&route.robot, &scan),
             Err(fault) => {
                 route.unreadable += 1;
-                output.warn(format!("a point cloud on `{topic}` could not be read: {fault}"));
+                output.warn(format!("a point cloud on `{topic}` was left out: {fault}"));
                 Ok(())
             }
         }

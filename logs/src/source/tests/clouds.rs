@@ -54,19 +54,20 @@ fn a_robot_with_a_3d_lidar_alone_has_scans_from_where_it_is_mounted() {
 #[test]
 fn a_cloud_that_cannot_be_read_is_a_warning_with_its_reason() {
     let data = points();
+    let floor: Vec<u8> =
+        [3.0_f32, 0.0, -1.0].iter().cycle().take(data.len() / 4).flat_map(|n| n.to_le_bytes()).collect();
     let (_folder, files) = write(|log| {
-        log.add("/robot1/points", PointCloud2::NAME, 1, &cloud("robot1/base_link", &data, 8)).add(
-            "/robot2/points",
-            PointCloud2::NAME,
-            2,
-            &cloud("robot2/base_link", &data, 16),
-        );
+        log.add("/robot1/points", PointCloud2::NAME, 1, &cloud("robot1/base_link", &data, 8))
+            .add("/robot2/points", PointCloud2::NAME, 2, &cloud("robot2/base_link", &data, 16))
+            .add("/robot3/points", PointCloud2::NAME, 3, &cloud("robot3/base_link", &floor, 12));
     });
     let run = try_run(files, "", RobotTopics::default()).unwrap();
     assert_eq!(run.on("scans").len(), 0);
     for warning in [
-        "a point cloud on `/robot1/points` could not be read: its points have no field `z` that is one floating-point number",
-        "a point cloud on `/robot2/points` could not be read: its data are shorter than its rows",
+        "a point cloud on `/robot1/points` was left out: its points have no field `z` that is one floating-point number",
+        "a point cloud on `/robot2/points` was left out: its data are shorter than its rows",
+        "a point cloud on `/robot3/points` was left out: none of its points is from 0.2 to 0.9 m above the base, where walls are \
+         looked for; is its frame right?",
     ] {
         assert_eq!(run.warnings.get(warning), Some(&1), "{:?}", run.warnings);
     }
