@@ -145,7 +145,7 @@ fn robots_with_scans_and_odometry_alone_are_merged() {
     gridweave(folder, &["merge", "scans.mcap", "-o", "out.mcap", "--lidar", "robot9=0,0,0"])
         .assert(1, &["`lidars` names `robot9`", "robot1, robot2"]);
     let degrees = ["merge", "scans.mcap", "-o", "out.mcap", "--set", "log.lidars={robot1 = [0, 0, 90]}"];
-    gridweave(folder, &degrees).assert(2, &["`lidars` must be [X, Y, YAW]", "90 degrees are 1.5708"]);
+    gridweave(folder, &degrees).assert(2, &["must be [X, Y, YAW] or [X, Y, YAW, ROLL]", "90 degrees are 1.5708"]);
 }
 
 /// Odometry as bad as that of public logs: the maps are built by SLAM, and merged.
