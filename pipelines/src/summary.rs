@@ -179,9 +179,12 @@ impl RunSummary {
     /// count: several stages take the same map, and have the same to say of it.
     fn distinct_warnings(&self) -> Vec<(&str, Vec<&str>, u64)> {
         let mut distinct: Vec<(&str, Vec<&str>, u64)> = Vec::new();
+        // A log may have tens of thousands of topics with a text of their own.
+        let mut places: BTreeMap<&str, usize> = BTreeMap::new();
         let warnings = self.stages.iter().flat_map(|stage| stage.warnings.iter().map(move |warning| (stage, warning)));
         for (StageSummary { name: stage, .. }, (what, count)) in warnings {
-            match distinct.iter_mut().find(|(known, ..)| *known == what) {
+            let place = *places.entry(what).or_insert(distinct.len());
+            match distinct.get_mut(place) {
                 Some((_, stages, most)) => {
                     stages.push(stage);
                     *most = *count.max(most);

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 /// The time that a router may take to answer before a warning.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// So often it is looked what of others fits.
+/// The interval between two looks at what others publish.
 const LOOK_PERIOD: Duration = Duration::from_secs(1);
 
 /// Whether anybody is heard, and since when that has been so.
