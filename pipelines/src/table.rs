@@ -25,10 +25,10 @@ impl Table {
         self.rows.push(cells.into_iter().collect());
     }
 
-    /// Formats the table in Markdown.
+    /// Formats the table in Markdown. Names cannot end a cell or a row, nor put HTML into the page.
     pub fn to_markdown(&self) -> String {
         let line = |row: &Vec<String>| {
-            let cells: Vec<String> = row.iter().map(|cell| cell.replace('|', "\\|")).collect();
+            let cells: Vec<String> = row.iter().map(|cell| markdown_cell(cell)).collect();
             format!("| {} |\n", cells.join(" | "))
         };
         let rule = |row: &Vec<String>| format!("|{}\n", " --- |".repeat(row.len()));
@@ -36,11 +36,17 @@ impl Table {
         heads.iter().map(|row| line(row) + &rule(row)).chain(rows.iter().map(line)).collect()
     }
 
-    /// Formats the table as comma-separated values (RFC 4180).
+    /// Formats the table as comma-separated values (RFC 4180). Texts that a spreadsheet would run as a formula begin
+    /// with an apostrophe.
     pub fn to_csv(&self) -> String {
-        let quoted = |cell: &String| match cell.contains([',', '"', '\n', '\r']) {
-            true => format!("\"{}\"", cell.replace('"', "\"\"")),
-            false => cell.clone(),
+        let quoted = |cell: &String| {
+            let is_formula =
+                cell.len() > 1 && cell.starts_with(['=', '+', '-', '@', '\t', '\r']) && cell.parse::<f64>().is_err();
+            let cell = if is_formula { format!("'{cell}") } else { cell.clone() };
+            match cell.contains([',', '"', '\n', '\r']) {
+                true => format!("\"{}\"", cell.replace('"', "\"\"")),
+                false => cell,
+            }
         };
         self.rows.iter().map(|row| row.iter().map(quoted).collect::<Vec<_>>().join(",") + "\n").collect()
     }
@@ -79,6 +85,21 @@ impl std::fmt::Display for Table {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.fit(None))
     }
+}
+
+/// A text as the cell of a table in Markdown.
+fn markdown_cell(text: &str) -> String {
+    let mut cell = String::with_capacity(text.len());
+    for letter in text.chars() {
+        match letter {
+            '|' | '\\' => cell.extend(['\\', letter]),
+            '<' => cell.push_str("&lt;"),
+            '&' => cell.push_str("&amp;"),
+            _ if letter.is_control() => cell.push(' '),
+            _ => cell.push(letter),
+        }
+    }
+    cell
 }
 
 /// Whether a cell is empty, a dash, or a number with at most a unit behind it.
@@ -178,6 +199,16 @@ mod tests {
         table.row(["r1".into(), "a|b, \"c\"".into()]);
         assert_eq!(table.to_markdown(), "| robot | why |\n| --- | --- |\n| r1 | a\\|b, \"c\" |\n");
         assert_eq!(table.to_csv(), "robot,why\nr1,\"a|b, \"\"c\"\"\"\n");
+    }
+
+    #[test]
+    fn a_name_is_neither_html_nor_a_row_nor_a_formula() {
+        let mut table = Table::new(["robot", "x"]);
+        table.row(["<img src=x>\n\\|".into(), "-1.5".into()]);
+        table.row(["=1+1".into(), "-".into()]);
+        let rows = "| &lt;img src=x> \\\\\\| | -1.5 |\n| =1+1 | - |\n";
+        assert_eq!(table.to_markdown(), format!("| robot | x |\n| --- | --- |\n{rows}"));
+        assert_eq!(table.to_csv(), "robot,x\n\"<img src=x>\n\\|\",-1.5\n'=1+1,-\n");
     }
 
     #[test]
