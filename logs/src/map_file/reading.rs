@@ -3,6 +3,7 @@
 use super::Mode;
 use super::shades::{Histogram, Shades, is_transparent};
 use super::warning::{MapFileWarning, UnknownGrey};
+use gridweave_runtime::ros::cell;
 
 /// The shade in which map savers write unknown cells.
 const UNKNOWN_SHADE: usize = 205;
@@ -67,7 +68,13 @@ impl Reading {
         let stands_out = greys[shade] > greys[shade - spread - 1].max(greys[shade + spread + 1]);
         // The map server averages opacity with the colours.
         let literally = |shade: usize| if has_opacity { 0.75 * occupancy_of(shade) } else { occupancy_of(shade) };
-        let is_free = |shade: &usize| literally(*shade) < self.free_thresh;
+        // The histogram is reversed already.
+        let of_histogram = Self { negate: false, ..self };
+        let is_free = |shade: &usize| match self.mode {
+            // A small occupancy is free space as well as none.
+            Mode::Scale => cell::is_free(of_histogram.cell(&[*shade as f64], None, 255.0)),
+            _ => literally(*shade) < self.free_thresh,
+        };
         let misread: u64 = range.clone().filter(is_free).map(|shade| greys[shade]).sum();
         let is_misread = stands_out && misread > 0;
         let darkest = greys.iter().position(|count| *count > 0).map_or(0.0, occupancy_of);

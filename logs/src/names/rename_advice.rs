@@ -9,16 +9,35 @@ const ROBOT: &str = "{robot}";
 /// Parts of topics that say where on a robot a sensor is.
 const PLACES: [&str; 8] = ["front", "rear", "back", "left", "right", "top", "upper", "lower"];
 
+/// First parts of topics that name a program, and no robot.
+const PROGRAMS: [&str; 10] = [
+    "cartographer",
+    "hdl_graph_slam",
+    "map_merge",
+    "map_server",
+    "merged",
+    "move_base",
+    "octomap_server",
+    "rtabmap",
+    "server",
+    "slam_toolbox",
+];
+
 /// The options `--rename` that put the maps on `topics` under the names of their robots, where `pattern` is the topic
 /// that maps are expected on. Empty if two topics fit at least, or if the topics do not show which robots there are.
 ///
-/// Topics that differ in one part are those of several robots: `/fleet/{robot}/map`. Topics of one part, such as
-/// `/map1`, `/b_map` or `/map` beside `/robot2/map`, are renamed one by one.
+/// Topics that differ in one part are those of several robots: `/fleet/{robot}/map`, `/maps/{robot}`. Topics of one
+/// part, such as `/map1`, `/b_map` or `/map` beside `/robot2/map`, are renamed one by one, as are those of robots whose
+/// maps have different names: `/husky/slam_toolbox/map` and `/jackal/map`.
 pub fn rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -> Vec<String> {
     let (fitting, others): (BTreeSet<&str>, BTreeSet<&str>) =
         topics.partition(|topic| match_robot(pattern, topic).is_some());
-    // A costmap is made of a map, and is none.
-    let others: Vec<&str> = others.into_iter().filter(|topic| !topic.contains("costmap")).collect();
+    // A costmap is made of a map, and takes its place only where there is no map at all.
+    let (costmaps, others): (Vec<&str>, Vec<&str>) = others.into_iter().partition(|topic| topic.contains("costmap"));
+    let others = match others.is_empty() && fitting.is_empty() {
+        true => costmaps.into_iter().filter(|topic| topic.ends_with("global_costmap/costmap")).collect(),
+        false => others,
+    };
     // Where two robots have maps that fit, further grids are not those of robots.
     if fitting.len() > 1 {
         return Vec::new();
@@ -30,10 +49,11 @@ pub fn rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -
     }
     let mut robots: BTreeSet<String> =
         fitting.iter().filter_map(|topic| match_robot(pattern, topic)).map(str::to_owned).collect();
-    let single: Vec<&str> = others.into_iter().filter(|topic| topic.matches('/').count() == 1).collect();
+    let (single, longer): (Vec<&str>, Vec<&str>) =
+        others.into_iter().partition(|topic| topic.matches('/').count() == 1);
     // One map alone is that of the only robot: there is no other to distinguish it from.
     if robots.len() + single.len() < 2 {
-        return Vec::new();
+        return advice_by_robot(&fitting, &longer, pattern);
     }
     let mut advice = Vec::new();
     // Beside the maps of two robots that name them, one that names none is a map that they share.
@@ -49,6 +69,46 @@ pub fn rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -
         }
     }
     advice
+}
+
+/// The options for topics whose robots are named by the first part in which they differ, one for each robot beside
+/// those whose topics are `fitting`. Empty if there are not two robots.
+fn advice_by_robot(fitting: &BTreeSet<&str>, longer: &[&str], pattern: &str) -> Vec<String> {
+    let parts = |topic: &str| topic.split('/').map(str::to_owned).collect::<Vec<_>>();
+    let last = |topic: &str| topic.rsplit('/').next().unwrap_or_default().to_owned();
+    let is_map = |topic: &&&str| last(topic) == "map" || last(topic).ends_with("_map");
+    let maps: Vec<&str> = longer.iter().filter(is_map).copied().collect();
+    let all: Vec<Vec<String>> = fitting.iter().chain(&maps).map(|topic| parts(topic)).collect();
+    let Some(first) = all.first() else { return Vec::new() };
+    let common = (0..first.len()).take_while(|place| all.iter().all(|parts| parts.get(*place) == first.get(*place)));
+    let place = common.count();
+    let robot = |topic: &str| {
+        let parts = parts(topic);
+        // The last part names what the topic carries.
+        parts.get(place).filter(|_| place + 1 < parts.len()).cloned()
+    };
+    let known: BTreeSet<String> =
+        fitting.iter().filter_map(|topic| match_robot(pattern, topic)).map(str::to_owned).collect();
+    let mut topic_of: BTreeMap<String, &str> = BTreeMap::new();
+    for topic in maps {
+        let Some(robot) = robot(topic).filter(|robot| !known.contains(robot)) else { continue };
+        if PROGRAMS.contains(&&*robot) || PLACES.contains(&&*robot) {
+            continue;
+        }
+        let chosen = topic_of.entry(robot).or_insert(topic);
+        if last(topic) == "map" && last(chosen) != "map" {
+            *chosen = topic;
+        }
+    }
+    if known.len() + topic_of.len() < 2 {
+        return Vec::new();
+    }
+    let options = topic_of.into_iter().map(|(robot, topic)| format!("{topic}={}", pattern.replace(ROBOT, &robot)));
+    // What the option takes is the only thing that is advised.
+    options
+        .filter(|option| option.parse::<TopicRename>().is_ok())
+        .map(|option| format!("--rename '{option}'"))
+        .collect()
 }
 
 /// The option `--rename` that puts the scans on `topics` under the names of their robots, where `pattern` is the topic
@@ -72,8 +132,10 @@ fn common_template(topics: &[&str], what: &str) -> Option<String> {
     let mut templates: BTreeMap<String, usize> = BTreeMap::new();
     for topic in topics {
         let parts: Vec<&str> = topic.split('/').collect();
-        // The last part names what the topic carries, and the first is empty.
-        for varying in 1..parts.len().saturating_sub(1) {
+        // The last part names what the topic carries, but for `/maps/robot1`; the first is empty.
+        let names_robot =
+            parts.len().checked_sub(2).is_some_and(|place| [what, &format!("{what}s")].contains(&parts[place]));
+        for varying in 1..parts.len() - usize::from(!names_robot) {
             // The lidars of one robot are no robots.
             if parts.get(varying).is_some_and(|part| PLACES.contains(part)) {
                 continue;
@@ -128,6 +190,12 @@ mod tests {
                 "/{robot}/rtabmap/grid_map",
             ),
             (&["/x/a/map", "/x/a/global_costmap", "/x/b/map", "/x/b/global_costmap"], "/x/{robot}/map"),
+            (&["/maps/a", "/maps/b"], "/maps/{robot}"),
+            (&["/map/robot1", "/map/robot2", "/map/robot3"], "/map/{robot}"),
+            (
+                &["/a/global_costmap/costmap", "/b/global_costmap/costmap", "/a/local_costmap/costmap"],
+                "/{robot}/global_costmap/costmap",
+            ),
         ] {
             assert_eq!(advice(topics), [format!("--rename '{template}=/{{robot}}/map'")]);
         }
@@ -145,6 +213,17 @@ mod tests {
         // A map that two robots share is not one of theirs.
         let named = [("/a_map", "a"), ("/b_map", "b")];
         assert_eq!(advice(&["/map", "/a_map", "/b_map"]), renamed(&named));
+    }
+
+    #[test]
+    fn robots_whose_maps_have_different_names_are_renamed_one_by_one() {
+        assert_eq!(advice(&["/robot1/map", "/robot2/slam/map"]), ["--rename '/robot2/slam/map=/robot2/map'"]);
+        let two = ["--rename '/husky/slam_toolbox/map=/husky/map'", "--rename '/jackal/rtabmap/grid_map=/jackal/map'"];
+        assert_eq!(advice(&["/husky/slam_toolbox/map", "/jackal/rtabmap/grid_map"]), two);
+        let two = ["--rename '/fleet/a/robot1/map=/a/map'", "--rename '/fleet/b/robot2/map=/b/map'"];
+        assert_eq!(advice(&["/fleet/a/robot1/map", "/fleet/b/robot2/map"]), two);
+        // A further map of one robot, and that of a program.
+        assert_eq!(advice(&["/robot1/map", "/robot1/slam/map", "/rtabmap/x/grid_map"]), Vec::<String>::new());
     }
 
     #[test]

@@ -21,6 +21,9 @@ use std::path::{Path, PathBuf};
 /// are the same; one is not writable, or is being written by another run.
 pub(crate) fn check(pipeline: &Pipeline, file: Option<&Path>, options: &RunOptions) -> Result<()> {
     let inputs: Vec<PathBuf> = inputs(pipeline).into_iter().chain(file.map(Path::to_owned)).collect();
+    // First, as a map with the ending of an image has that of its own image.
+    let maps = files_of(pipeline, "map_file_sink", "file");
+    maps.iter().chain(&options.map).try_for_each(|map| check_ending(map, "a map", &["yaml", "yml"]))?;
     let mut outputs = outputs(pipeline, options);
     let files = outputs.len();
     outputs.extend(trace::file().cloned());
@@ -38,6 +41,11 @@ pub(crate) fn check(pipeline: &Pipeline, file: Option<&Path>, options: &RunOptio
         }
     }
     logs(pipeline).iter().try_for_each(|log| check_log_ending(log))?;
+    let summaries = files_of(pipeline, "summary_sink", "file");
+    summaries
+        .iter()
+        .chain(&options.summary)
+        .try_for_each(|summary| check_ending(summary, "a summary", &["json", "yaml", "yml"]))?;
     // The last check, as it removes what killed runs have left. The trace is being written.
     outputs[..files].iter().try_for_each(|output| check_writable(output))?;
     Ok(())
@@ -79,9 +87,16 @@ pub(crate) fn check_log_ending(log: &Path) -> Result<()> {
     }
     let ending = log.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
     let instead = match ending.as_str() {
-        "png" | "pdf" | "svg" | "jpg" | "jpeg" => format!("give --picture {}, and a log as merged.mcap", log.display()),
+        "png" | "pdf" | "svg" | "jpg" | "jpeg" => format!(
+            "give a log as merged.mcap, and draw it by `gridweave render merged.mcap -o {picture}`; a merge draws its map by \
+             --picture {picture} as well",
+            picture = log.display()
+        ),
         "pgm" | "yaml" | "yml" | "bmp" => {
-            format!("give --map {}, and a log as merged.mcap", log.with_extension("yaml").display())
+            format!(
+                "a merge writes its map by --map {}, and a log as merged.mcap",
+                log.with_extension("yaml").display()
+            )
         }
         "json" => format!("give --summary {}, and a log as merged.mcap", log.display()),
         "html" | "htm" => {
@@ -95,6 +110,28 @@ pub(crate) fn check_log_ending(log: &Path) -> Result<()> {
         _ => return Ok(()),
     };
     Err(BadUse(format!("a log is written as MCAP or as a ROS 1 bag, and not as {}: {instead}", log.display())).into())
+}
+
+/// Checks that a file that holds `what` does not have the ending of another format than that of `endings`.
+///
+/// # Errors
+///
+/// It does; the error says which ending it has to have.
+pub(crate) fn check_ending(file: &Path, what: &str, endings: &[&str]) -> Result<()> {
+    const KNOWN: [&str; 19] = [
+        "bag", "bmp", "csv", "db3", "gif", "htm", "html", "jpeg", "jpg", "json", "mcap", "md", "pdf", "pgm", "png",
+        "svg", "txt", "yaml", "yml",
+    ];
+    let Some(ending) = file.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase) else {
+        return Ok(());
+    };
+    match KNOWN.contains(&&*ending) && !endings.contains(&&*ending) {
+        true => {
+            let right = file.with_extension(endings[0]);
+            Err(BadUse(format!("{what} is not written as {}: give {}", file.display(), right.display())).into())
+        }
+        false => Ok(()),
+    }
 }
 
 /// Checks the same of a log that is written as MCAP only.
@@ -182,6 +219,22 @@ fn same_file(a: &Path, b: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_map_and_a_summary_have_the_endings_of_their_formats() {
+        for (file, endings, right) in [
+            ("m.png", &["yaml", "yml"][..], "give m.yaml"),
+            ("m.json", &["yaml", "yml"], "give m.yaml"),
+            ("a/s.PNG", &["json"], "give a/s.json"),
+            ("r.pdf", &["html", "htm"], "give r.html"),
+        ] {
+            let error = check_ending(Path::new(file), "a map", endings).unwrap_err().to_string();
+            assert!(error.contains(right), "{error}");
+        }
+        for file in ["m.yaml", "m.YML", "m", "m.old"] {
+            assert!(check_ending(Path::new(file), "a map", &["yaml", "yml"]).is_ok(), "{file}");
+        }
+    }
 
     #[test]
     fn a_log_with_the_ending_of_another_format_is_refused_with_the_option_that_writes_it() {

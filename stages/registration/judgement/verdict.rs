@@ -8,7 +8,7 @@ use std::fmt::Write;
 
 /// Change of the size of a map from which on its resolution is in doubt: lidars and odometry are right to a percent or
 /// two.
-const RESOLUTION_ERROR: f64 = 0.03;
+const RESOLUTION_ERROR: f64 = 0.02;
 
 /// The second most probable candidate.
 #[derive(Clone, Debug, PartialEq)]

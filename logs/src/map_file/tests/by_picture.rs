@@ -19,6 +19,10 @@ fn the_image_overrides_the_thresholds_with_a_note() {
     assert!(warning.ends_with("--literal-thresholds reads the file literally"), "{warning}");
     // A file in shades of grey without opacity has no other sign of what is unknown.
     assert_eq!(read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "mode: scale").0, [100, -1, -1, 0]);
+    // With nav2's own threshold it is a small occupancy, which is free space as well.
+    let (folder, path) = folder(&yaml("mode: scale").replace("free_thresh: 0.25", "free_thresh: 0.196"));
+    fs::write(folder.path().join("map.pgm"), b"P5\n4 1\n255\n\x00\xcd\xcd\xfe").unwrap();
+    assert_eq!(load_as(&path, Thresholds::ByPicture).unwrap().0.cells, [100, -1, -1, 0]);
     // Where white is occupied, 205 is nearly so, and 50 is unknown.
     let (cells, warning) = read(b"P5\n4 1\n255\n\x00\xcd\xcd\xfe", "negate: 1");
     assert_eq!(cells, [0, 100, 100, 100]);

@@ -9,7 +9,7 @@ mod page;
 
 pub(crate) use live::LivePage;
 
-use crate::job::{Inputs, NamingOptions, check_is_no_input};
+use crate::job::{Inputs, NamingOptions, check_ending, check_is_no_input};
 use crate::status::{BadUse, Status};
 use crate::terminal::{eprint_line, print_line};
 use anyhow::{Context, Result, bail};
@@ -54,6 +54,7 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Status> {
                     `gridweave render`";
         return Err(BadUse(text.to_owned()).into());
     }
+    check_ending(&args.output, "a page", &["html", "htm"])?;
     check_is_no_input(args.inputs.iter().chain(&args.summary), &args.output)?;
     let summary = args.summary.as_deref().map(read_summary).transpose()?;
     let times = collect::moments(&args.inputs, &args.names)?;
