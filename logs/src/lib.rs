@@ -16,6 +16,7 @@ mod os_error;
 pub mod picture;
 pub mod qos;
 pub mod reader;
+mod robot_name;
 mod robots;
 pub mod schemas;
 pub mod sink;

@@ -5,7 +5,8 @@
 
 use crate::names::Names;
 use crate::reader::{ChannelPart, LogFile, LogReader};
-use crate::robots::{RobotChannels, Role, fits, is_scan};
+use crate::robot_name::fits;
+use crate::robots::{RobotChannels, Role, is_scan};
 use crate::schemas::full_type_name;
 use crate::tf::tf_topic;
 use gridweave_runtime::message::Channel;
@@ -118,7 +119,7 @@ impl OneMap {
         let has_grid = |robot: &str| has(robot, is_grid);
         let in_map = posed.iter().filter(|(robot, frames)| frames.contains(&frame) && fits(robot) && !has_grid(robot));
         let robots: BTreeSet<String> = in_map.map(|(robot, _)| robot.clone()).collect();
-        let mut busy: BTreeSet<&str> = roles.tags_in_tf().iter().map(String::as_str).chain(roles.scanned()).collect();
+        let mut busy: BTreeSet<&str> = roles.tags_in_tf().chain(roles.scanned()).collect();
         for channel in names.channels() {
             let classified = roles.classify(channel);
             if matches!(classified.role, Role::Tags | Role::TagMessage | Role::Scan | Role::MapUpdate) {

@@ -1,6 +1,6 @@
 //! Robot poses from tf, the tree of frames that ROS programs publish edge by edge.
 
-use crate::robots::fits;
+use crate::robot_name::fits;
 use crate::schemas::full_type_name;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{Header, Point, Pose, PoseStamped, Quaternion, RosMessage, TFMessage, Time, Transform};

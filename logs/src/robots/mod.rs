@@ -1,6 +1,7 @@
 //! The robots of a log: which channel carries what of which robot, and how poses, scans and tag readings are read.
 
 mod cell_values;
+mod channel_patterns;
 mod channels;
 mod driver_topics;
 mod inferred_poses;
@@ -9,6 +10,7 @@ mod mounts;
 mod point_cloud;
 mod pose;
 mod poses_in_map;
+mod role;
 mod scan_topics;
 mod scans;
 mod tag_positions;
@@ -16,12 +18,13 @@ mod tag_reader;
 mod tilt;
 
 pub use cell_values::CellValues;
-pub(crate) use channels::{Classified, PoseSource, RobotChannels, Role, fits};
+pub(crate) use channels::RobotChannels;
 pub(crate) use inferred_poses::InferredPoses;
 pub(crate) use merged_maps::{MapOrigin, MergedMaps};
 pub(crate) use mounts::NoTransform;
 pub(crate) use pose::{NoPose, pose_with_covariance};
 pub(crate) use poses_in_map::PosesInMap;
+pub(crate) use role::{Classified, PoseSource, Role};
 pub use scans::LidarPoses;
 pub(crate) use scans::{Scans, is_scan, read_scan};
 pub(crate) use tag_positions::TagPositions;

@@ -1,6 +1,6 @@
 //! Poses read from every message type that contains one.
 
-use super::channels::PoseSource;
+use super::role::PoseSource;
 use gridweave_runtime::ros::{Header, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, decode, encode};
 use serde::Deserialize;
 use std::borrow::Cow;

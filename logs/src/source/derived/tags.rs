@@ -18,14 +18,14 @@ pub(super) struct DerivedTags {
 impl DerivedTags {
     /// Creates the derivation for robots with the base frame `base_frame`, or one of the usual names.
     pub(super) fn new(base_frame: Option<&str>, roles: &RobotChannels) -> Self {
-        let positions = roles.sees_tags().then(|| TagPositions::new(base_frame, roles.tags_in_tf().clone()));
+        let positions = roles.sees_tags().then(|| TagPositions::new(base_frame, tags_in_tf(roles)));
         Self { positions, has_made_readings: false }
     }
 
     /// Replaces the roles. Known frames are kept.
     pub(super) fn set_roles(&mut self, roles: &RobotChannels) {
         if let Some(positions) = &mut self.positions {
-            positions.set_robots(roles.tags_in_tf().clone());
+            positions.set_robots(tags_in_tf(roles));
         }
     }
 
@@ -142,4 +142,9 @@ impl DerivedTags {
     pub(super) fn has_made_readings(&self) -> bool {
         self.has_made_readings
     }
+}
+
+/// The robots whose tags are frames in tf.
+fn tags_in_tf(roles: &RobotChannels) -> BTreeSet<String> {
+    roles.tags_in_tf().map(str::to_owned).collect()
 }
