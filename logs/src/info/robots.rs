@@ -1,7 +1,7 @@
 //! The contents of a log by robot.
 
-use super::LogInfo;
-use crate::names::{rename_advice, scan_rename_advice};
+mod problems;
+
 use crate::one_map::OneMap;
 use crate::robots::{
     Classified, InferredPoses, MapOrigin, MergedMaps, PoseSource, RobotChannels, Role, TagReader, is_scan,
@@ -256,129 +256,6 @@ impl RobotSurvey {
     /// Whether a robot is one of the log.
     pub(super) fn is_known(&self, robot: &str) -> bool {
         self.robots.contains_key(robot)
-    }
-
-    /// Problems with reading the logs or merging the maps, in the order in which they should be fixed.
-    pub(super) fn problems(&self, info: &LogInfo) -> Vec<String> {
-        let mut problems = Vec::new();
-        for file in &info.files {
-            let path = file.path.display();
-            problems.extend(file.damage.iter().map(|(what, times)| match times {
-                1 => format!("{path}: {what}"),
-                times => format!("{path}: {what} ({times} times)"),
-            }));
-        }
-        if info.messages == 0 {
-            problems.push("there are no messages".into());
-            return problems;
-        }
-        problems.extend(self.mismatches.iter().cloned());
-        for (topic, count) in &self.unreadable {
-            problems.push(format!("{count} messages on `{topic}` do not match their type"));
-        }
-        for (robot, (error, count)) in &self.unusable_maps {
-            problems.push(format!("{count} of the maps of {robot} cannot be used: {error}"));
-        }
-        for topic in &self.merged_topics {
-            problems.push(format!("maps on `{topic}` are merged ones of another program, and are not used"));
-        }
-        let robots = &self.robots;
-        let pattern = &self.topics.map;
-        let has_no_map = robots.values().all(|robot| robot.maps == 0 && robot.scans == 0);
-        let with_maps = robots.iter().filter(|(_, robot)| robot.maps > 0);
-        let fitting: Vec<String> = with_maps.map(|(name, _)| pattern.replace("{robot}", name)).collect();
-        let other_maps = || self.other_maps.iter().map(String::as_str);
-        let advice = rename_advice(other_maps().chain(fitting.iter().map(String::as_str)), pattern);
-        let topics: Vec<&str> = other_maps().collect();
-        let topics = topics.join(", ");
-        let in_one_map = |robot: &str| self.one_map.as_ref().is_some_and(|one_map| one_map.robots.contains(robot));
-        let one_map = self.one_map.iter();
-        problems.extend(one_map.map(|one_map| one_map.note().unwrap_or_else(|| one_map.reason(pattern))));
-        match (advice.as_slice(), topics.as_str()) {
-            ([], _) if self.one_map.is_some() => {}
-            ([], "") if has_no_map => {
-                let scans: Vec<&str> = self.other_scans.iter().map(String::as_str).collect();
-                let scans = match scans.is_empty() {
-                    true => String::new(),
-                    false => format!(
-                        "; `merge` builds maps from the scans on {} if the robot is named (`gridweave merge ROBOT=LOG \
-                         OTHER_ROBOT=OTHER_LOG`)",
-                        scans.join(", ")
-                    ),
-                };
-                problems.push(format!(
-                    "no map was recognised: no topic fits `{pattern}`; there is no occupancy grid at all{scans}"
-                ));
-            }
-            ([], topics) if has_no_map => problems.push(format!(
-                "no map was recognised: no topic fits `{pattern}`; there are occupancy grids on {topics}: if the log is of one \
-                 robot, name the robot (`gridweave merge ROBOT=LOG OTHER_ROBOT=OTHER_LOG`), else set `robots.map` to match them"
-            )),
-            ([], _) => {}
-            (advice, topics) => {
-                problems.push(format!("maps on {topics} do not fit `{pattern}`: give {}", advice.join(" ")));
-            }
-        }
-        let scans = self.other_scans.iter().map(String::as_str);
-        if let Some(advice) = scan_rename_advice(scans, &self.topics.scan).filter(|_| has_no_map) {
-            problems
-                .push(format!("scans do not fit `{}`, and no map is built from them: give {advice}", self.topics.scan));
-        }
-        if let [robot] = robots.keys().collect::<Vec<_>>()[..]
-            && advice.is_empty()
-        {
-            problems.push(format!("there is one robot only, {robot}: merge the log with that of another robot"));
-        }
-        let mut missing_poses = self.inferred.missing();
-        missing_poses.retain(|robot, _| robots.contains_key(robot));
-        let lacking = |kind: &str, what: fn(&RobotInfo) -> u64| {
-            let lacks = |(name, robot): &(&String, &RobotInfo)| {
-                let is_reported = match kind {
-                    "map" => in_one_map(name),
-                    "pose" => missing_poses.contains_key(name.as_str()),
-                    _ => false,
-                };
-                what(robot) == 0 && !is_reported
-            };
-            let names = robots.iter().filter(lacks).map(|(name, _)| name.as_str());
-            names.collect::<Vec<_>>().join(", ")
-        };
-        type Lacking = (&'static str, fn(&RobotInfo) -> u64);
-        let kinds: [Lacking; 3] = [
-            ("map", |robot: &RobotInfo| robot.maps + robot.scans),
-            ("pose", |robot: &RobotInfo| robot.poses),
-            ("tag reading", |robot: &RobotInfo| robot.readings),
-        ];
-        for (what, count) in kinds {
-            let names = lacking(what, count);
-            let already_reported = what == "map" && robots.values().all(|robot| robot.maps == 0 && robot.scans == 0);
-            if !names.is_empty() && !already_reported {
-                problems.push(format!("there is no {what} of {names}"));
-            }
-        }
-        problems.extend(missing_poses.into_values());
-        problems.extend(
-            robots.iter().filter(|(_, robot)| robot.scans > 0).map(|(name, robot)| self.built_map(name, robot)),
-        );
-        problems
-    }
-
-    /// A description of the map that would be built for a robot without one.
-    fn built_map(&self, name: &str, robot: &RobotInfo) -> String {
-        let poses = robot.poses_from.clone().or_else(|| self.inferred.origin(name)).filter(|_| robot.poses > 0);
-        let by_topic = self.odometry.get(name).map(|topic| format!("`{topic}`"));
-        let how = match (poses, by_topic.or_else(|| self.inferred.odometry_origin(name))) {
-            (Some(poses), _) => {
-                format!("builds one from its {} scans, at the poses of {poses}", robot.scans)
-            }
-            (None, Some(odometry)) => {
-                format!("builds one from its {} scans by SLAM, with the odometry of {odometry}", robot.scans)
-            }
-            (None, None) => {
-                format!("builds one from its {} scans by SLAM; odometry would make it surer", robot.scans)
-            }
-        };
-        format!("there is no map of {name}: `merge` {how}")
     }
 
     pub(super) fn into_robots(mut self) -> BTreeMap<String, RobotInfo> {
