@@ -4,6 +4,7 @@ mod channels;
 mod clocks;
 mod robots;
 mod run;
+mod topics;
 
 #[cfg(test)]
 mod tests;
@@ -12,19 +13,18 @@ pub use channels::{holds_tags_alone, robots_with_scans_only};
 pub use clocks::ClockInfo;
 pub use robots::RobotInfo;
 pub use run::RunInfo;
+pub use topics::TopicInfo;
 
 use crate::names::{self, Input, NameError, NameRules, Names, Renamed};
 use crate::one_map::OneMap;
-use crate::qos;
 use crate::reader::{Damage, LogFile, LogReader};
-use crate::robots::Role;
-use clocks::HeaderPlace;
-use gridweave_runtime::message::{Channel, LogTime};
+use gridweave_runtime::message::LogTime;
 use gridweave_runtime::stage::RobotTopics;
 use robots::RobotSurvey;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
+use topics::{Entry, Topics};
 
 /// The contents of one or more logs. Times are seconds since the epoch.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -84,44 +84,6 @@ pub struct FileInfo {
     pub damage: BTreeMap<String, u64>,
 }
 
-/// A topic.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct TopicInfo {
-    /// The name, under its robot.
-    pub topic: String,
-    /// The names in the logs.
-    pub logged: BTreeSet<String>,
-    /// The message type; empty if the log does not contain it.
-    #[serde(rename = "type")]
-    pub type_name: String,
-    /// The message encoding, `cdr` for ROS 2.
-    pub encoding: String,
-    /// The number of messages.
-    pub messages: u64,
-    /// The size of the messages, uncompressed, bytes.
-    pub bytes: u64,
-    /// The log time of the first message.
-    pub first: f64,
-    /// The log time of the last message.
-    pub last: f64,
-    /// The mean number of messages per second, from the first to the last; `None` for a single one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rate: Option<f64>,
-    /// The longest time between consecutive messages, seconds.
-    pub largest_gap: f64,
-    /// The quality of service: `latched`, `reliable` or `best effort`; empty if unknown.
-    pub qos: String,
-    /// The frames in the headers, at most ten.
-    #[serde(skip_serializing_if = "BTreeSet::is_empty")]
-    pub frames: BTreeSet<String>,
-    /// The offset of the stamps in the headers from the log times.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub clock: Option<ClockInfo>,
-}
-
-/// The maximum number of frames listed for a topic.
-const MOST_FRAMES: usize = 10;
-
 /// Reads logs completely and returns their contents. `rules` name the topics, and `robots` are the topic patterns.
 ///
 /// # Errors
@@ -153,17 +115,27 @@ fn look(inputs: &[Input], rules: &NameRules, robots: &RobotTopics, large: u64) -
     if is_sampled {
         reader.sample(SAMPLE);
     }
-    let mut info = LogInfo { is_sampled, files: files.iter().map(file_info).collect(), ..Default::default() };
-    info.note = names.note().map(str::to_owned);
-    for (number, file) in info.files.iter_mut().enumerate() {
-        file.robot = names.robot_of_file(number).map(str::to_owned);
-    }
-    for (file, log) in info.files.iter_mut().zip(files.iter()) {
-        log.damage().iter().for_each(|damage| file.add(damage));
-    }
-    let mut topics = Topics { known: vec![Vec::new(); files.len()], entries: Vec::new() };
+    let mut info = LogInfo { is_sampled, note: names.note().map(str::to_owned), ..Default::default() };
+    info.files = files.iter().enumerate().map(|(number, file)| file_info(file, names.robot_of_file(number))).collect();
     let mut survey = RobotSurvey::new(robots.clone(), names.channels());
     survey.set_one_map(OneMap::read(&files, &names, robots));
+    let mut topics = Topics::new(files.len());
+    let mut times = read(&mut reader, &names, &mut topics, &mut survey, &mut info);
+    if is_sampled {
+        times = topics.complete(&files, &names, &mut survey, &mut info);
+    }
+    Ok(finish(info, topics, survey, times))
+}
+
+/// Reads the messages. Returns the times of the first and the last one.
+fn read(
+    reader: &mut LogReader,
+    names: &Names,
+    topics: &mut Topics,
+    survey: &mut RobotSurvey,
+    info: &mut LogInfo,
+) -> Option<(LogTime, LogTime)> {
+    let files = reader.files().clone();
     let mut renamed = Vec::new();
     let mut times: Option<(LogTime, LogTime)> = None;
     while let Some(message) = reader.next_message() {
@@ -172,70 +144,53 @@ fn look(inputs: &[Input], rules: &NameRules, robots: &RobotTopics, large: u64) -
         if !names.wants(index, message.channel) {
             continue;
         }
-        let Some(entry) = topics.find(&files, &names, index, message.channel, &mut survey) else {
+        let Some(entry) = topics.find(&files, names, index, message.channel, survey) else {
             file.add(&Damage::UnknownChannel { channel: message.channel });
             continue;
         };
-        let first = times.map_or(time, |(first, _)| first);
-        times = Some((first, time));
+        times = Some((times.map_or(time, |(first, _)| first), time));
         file.messages += 1;
         info.messages += 1;
-        let Entry { role, robot, info: topic, header, .. } = entry;
-        match topic.messages {
-            0 => topic.first = time.seconds(),
-            _ => topic.largest_gap = topic.largest_gap.max(time.seconds() - topic.last),
-        }
+        let Entry { role, robot, header, info: topic } = entry;
         if let Some(header) = header.read(message.data) {
             let later = files.get(index).map_or(0, LogFile::later);
-            topic.clock.get_or_insert_default().add(&header, time, later);
-            let frame = names.frame(index, message.channel, &header.frame_id);
-            if topic.frames.len() < MOST_FRAMES && !topic.frames.contains(&*frame) {
-                topic.frames.insert(frame.into_owned());
-            }
+            topic.add_header(&header, time, later, names.frame(index, message.channel, &header.frame_id));
         }
-        topic.last = time.seconds();
-        topic.messages += 1;
-        topic.bytes += message.data.len() as u64;
+        topic.add_message(time, message.data.len());
         // The frames must have the names that a merge gives them.
         let is_renamed = RobotSurvey::reads(*role) && names.rename_frames(&message, &mut renamed) == Renamed::Copied;
         survey.take(*role, robot, &topic.topic, if is_renamed { &renamed } else { message.data });
     }
-    add_late_damage(&mut reader, &mut info);
-    if is_sampled {
-        times = topics.complete(&files, &names, &mut survey, &mut info);
-    }
-    if let Some((first, last)) = times {
-        (info.start, info.end) = (Some(first.seconds()), Some(last.seconds()));
-        info.duration = last.seconds_since(first);
-    }
-    survey.remove_merged_maps();
-    let robots = topics.entries.iter().map(|entry| (entry.robot.as_str(), &entry.info));
-    let clocks = clocks::notes(robots.filter(|(robot, _)| survey.is_known(robot)));
-    let finished = |Entry { mut info, .. }: Entry| {
-        let seconds = info.last - info.first;
-        info.rate = (info.messages > 1 && seconds > 0.0).then(|| (info.messages - 1) as f64 / seconds);
-        info
-    };
-    info.topics = topics.entries.into_iter().map(finished).collect();
-    info.topics.sort_by(|a, b| (&a.topic, &a.type_name).cmp(&(&b.topic, &b.type_name)));
-    info.problems = survey.problems(&info);
-    info.problems.extend(clocks);
-    info.robots = survey.into_robots();
-    Ok(info)
-}
-
-fn add_late_damage(reader: &mut LogReader, info: &mut LogInfo) {
     for (file, damage) in reader.take_damage() {
         if let Some(file) = info.files.get_mut(file) {
             file.add(&damage);
         }
     }
+    times
 }
 
-fn file_info(file: &LogFile) -> FileInfo {
+/// Completes the contents with the topics, the robots and the problems. `times` are those of the first and the last
+/// message.
+fn finish(mut info: LogInfo, topics: Topics, mut survey: RobotSurvey, times: Option<(LogTime, LogTime)>) -> LogInfo {
+    if let Some((first, last)) = times {
+        (info.start, info.end) = (Some(first.seconds()), Some(last.seconds()));
+        info.duration = last.seconds_since(first);
+    }
+    survey.remove_merged_maps();
+    let robots = topics.entries().iter().map(|entry| (entry.robot.as_str(), &entry.info));
+    let clocks = clocks::notes(robots.filter(|(robot, _)| survey.is_known(robot)));
+    info.topics = topics.finish();
+    info.problems = survey.problems(&info);
+    info.problems.extend(clocks);
+    info.robots = survey.into_robots();
+    info
+}
+
+fn file_info(file: &LogFile, robot: Option<&str>) -> FileInfo {
     let name = |compression: &String| if compression.is_empty() { "none".to_owned() } else { compression.clone() };
-    FileInfo {
+    let mut info = FileInfo {
         path: file.path().to_owned(),
+        robot: robot.map(str::to_owned),
         container: file.container(),
         size: file.size(),
         chunks: file.chunks(),
@@ -244,134 +199,13 @@ fn file_info(file: &LogFile) -> FileInfo {
         metadata: file.metadata_names().filter(|name| !run::is_of_run(name)).map(str::to_owned).collect(),
         attachments: file.attachments(),
         ..Default::default()
-    }
+    };
+    file.damage().iter().for_each(|damage| info.add(damage));
+    info
 }
 
 impl FileInfo {
     fn add(&mut self, damage: &Damage) {
         *self.damage.entry(damage.to_string()).or_default() += 1;
-    }
-}
-
-/// The topics found so far. Channels with equal topic, type and encoding are one topic.
-struct Topics {
-    /// By file and channel number: the index of the entry, once known.
-    known: Vec<Vec<Option<usize>>>,
-    entries: Vec<Entry>,
-}
-
-struct Entry {
-    role: Role,
-    robot: String,
-    header: HeaderPlace,
-    info: TopicInfo,
-}
-
-impl Topics {
-    /// Replaces the sampled statistics by those of all messages, from the indexes. Returns the times of the first and
-    /// the last message.
-    fn complete(
-        &mut self,
-        files: &[LogFile],
-        names: &Names,
-        survey: &mut RobotSurvey,
-        info: &mut LogInfo,
-    ) -> Option<(LogTime, LogTime)> {
-        info.messages = 0;
-        let sampled = |entry: &mut Entry| (std::mem::take(&mut entry.info.messages), entry.info.bytes);
-        let mut samples: Vec<(u64, u64)> = self.entries.iter_mut().map(sampled).collect();
-        self.entries.iter_mut().for_each(|entry| entry.info.largest_gap = 0.0);
-        let mut times: Option<(LogTime, LogTime)> = None;
-        for (number, file) in files.iter().enumerate() {
-            let mut of_file = 0;
-            for (&channel, indexed) in file.index().into_iter().flatten() {
-                if indexed.messages == 0 || !names.wants(number, channel) {
-                    continue;
-                }
-                let Some(Entry { info: topic, .. }) = self.find(files, names, number, channel, survey) else {
-                    continue;
-                };
-                let [first, last] =
-                    [indexed.first, indexed.last].map(|time| LogTime(time.saturating_add_signed(file.later())));
-                let gap = indexed.largest_gap as f64 * 1e-9;
-                match topic.messages {
-                    0 => {
-                        (topic.first, topic.last, topic.largest_gap) = (first.seconds(), last.seconds(), gap);
-                    }
-                    // The files of a split bag are consecutive.
-                    _ => {
-                        topic.largest_gap = topic.largest_gap.max(gap).max(first.seconds() - topic.last);
-                        topic.first = topic.first.min(first.seconds());
-                        topic.last = topic.last.max(last.seconds());
-                    }
-                }
-                topic.messages += indexed.messages;
-                of_file += indexed.messages;
-                let (earliest, latest) = times.unwrap_or((first, last));
-                times = Some((earliest.min(first), latest.max(last)));
-            }
-            info.messages += of_file;
-            if let Some(file) = info.files.get_mut(number) {
-                file.messages = of_file;
-            }
-        }
-        samples.resize(self.entries.len(), (0, 0));
-        for (Entry { role, robot, info: topic, .. }, (messages, bytes)) in self.entries.iter_mut().zip(samples) {
-            survey.add(*role, robot, &topic.topic, topic.messages.saturating_sub(messages));
-            let estimate = |messages: u64| (bytes as f64 / messages as f64 * topic.messages as f64) as u64;
-            topic.bytes = if messages == 0 { 0 } else { estimate(messages) };
-        }
-        times
-    }
-
-    fn find(
-        &mut self,
-        files: &[LogFile],
-        names: &Names,
-        file: usize,
-        number: u16,
-        survey: &mut RobotSurvey,
-    ) -> Option<&mut Entry> {
-        let known = self.known.get_mut(file)?;
-        let place = usize::from(number);
-        if known.len() <= place {
-            known.resize(place + 1, None);
-        }
-        let index = match known[place] {
-            Some(index) => index,
-            None => {
-                let channel = names.channel(file, number)?;
-                let index = self.entries.iter().position(|entry| entry.is_of(channel)).unwrap_or(self.entries.len());
-                if index == self.entries.len() {
-                    let (role, robot) = survey.classify(channel);
-                    let header = HeaderPlace::of(channel);
-                    self.entries.push(Entry { role, robot, header, info: topic_info(channel.clone()) });
-                }
-                if let (Some(entry), Some(logged)) = (self.entries.get_mut(index), files.get(file)?.channel(number)) {
-                    entry.info.logged.insert(logged.topic);
-                }
-                known[place] = Some(index);
-                index
-            }
-        };
-        self.entries.get_mut(index)
-    }
-}
-
-impl Entry {
-    fn is_of(&self, channel: &Channel) -> bool {
-        self.info.topic == channel.topic
-            && self.info.type_name == channel.schema_name
-            && self.info.encoding == channel.message_encoding
-    }
-}
-
-fn topic_info(channel: Channel) -> TopicInfo {
-    TopicInfo {
-        qos: qos::word(&channel.metadata).to_owned(),
-        topic: channel.topic,
-        type_name: channel.schema_name,
-        encoding: channel.message_encoding,
-        ..Default::default()
     }
 }

@@ -49,6 +49,7 @@ pub(crate) mod tests;
 pub use damage::{ChunkFault, Damage};
 pub use error::ReadError;
 pub use file::LogFile;
+pub(crate) use layout::IndexedChannel;
 pub(crate) use merge::ChannelPart;
 pub use merge::{LogMessage, LogReader};
 pub use paths::log_files;
