@@ -21,7 +21,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 /// The time that stages have to stop once the supervisor is gone. A stage that works on a message for longer is ended
-/// with its process: nobody is left who could use its result or end it.
+/// with its process: nothing is left that could use its result or end it.
 const ORPHAN_GRACE: Duration = Duration::from_secs(5);
 
 /// The maximum time between two reports of a process.
@@ -127,7 +127,7 @@ impl Process<'_> {
                 Ok(Event::Ended { stage, result }) => {
                     running -= 1;
                     Some(match result {
-                        Ok(report) => ProcessReport::Done { report },
+                        Ok(report) => ProcessReport::Done { stage_report: report },
                         Err(Failure::Link(LinkError::Stopped)) => ProcessReport::Stopped { stage: self.name(stage) },
                         Err(failure) => ProcessReport::Failed { stage: self.name(stage), failure },
                     })

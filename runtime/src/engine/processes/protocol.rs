@@ -7,7 +7,7 @@ use std::io::{self, Write};
 
 /// A report of a process to the supervisor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "said", rename_all = "snake_case")]
+#[serde(tag = "report", rename_all = "snake_case")]
 pub(super) enum ProcessReport {
     /// The process is alive. Sent at least every [`ALIVE_INTERVAL`](super::child::ALIVE_INTERVAL).
     Alive,
@@ -23,7 +23,7 @@ pub(super) enum ProcessReport {
     /// A stage has finished.
     Done {
         /// Its report, which includes the name of the stage.
-        report: StageReport,
+        stage_report: StageReport,
     },
     /// A stage has failed.
     Failed {
@@ -41,7 +41,7 @@ pub(super) enum ProcessReport {
 
 /// A command of the supervisor to a process.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "told", rename_all = "snake_case")]
+#[serde(tag = "command", rename_all = "snake_case")]
 pub(super) enum SupervisorCommand {
     /// End a live run: sources send no more, and pending messages are handled.
     Drain,
@@ -72,7 +72,7 @@ mod tests {
         let all = [
             ProcessReport::Alive,
             ProcessReport::Progress { stage: "log".into(), share: 0.1, log_time: LogTime(u64::MAX) },
-            ProcessReport::Done { report },
+            ProcessReport::Done { stage_report: report },
             ProcessReport::Failed { stage: "a".into(), failure: StageError::new("b\n", "c").with_help("d").into() },
             ProcessReport::Failed { stage: "a".into(), failure: Failure::Hung { seconds: 1.5 } },
             ProcessReport::Stopped { stage: "a".into() },

@@ -294,7 +294,7 @@ impl Supervisor<'_> {
         match report {
             ProcessReport::Alive => {}
             ProcessReport::Progress { stage, share, log_time } => self.observer.progress(&stage, share, log_time),
-            ProcessReport::Done { report } => {
+            ProcessReport::Done { stage_report: report } => {
                 ended(&report.name);
                 self.reports.insert(report.name.clone(), report);
             }
