@@ -1,9 +1,9 @@
 //! Which of what is published is taken as that of robots, what is not, and what to write so that it is: for the verb
 //! `doctor`, and for a run that finds no robot.
 
-use super::census::{Published, Topics};
+use super::discovery::node_identity::Owner;
+use super::discovery::publishers::{Published, Topics};
 use super::middleware::Middleware;
-use super::own_name::Owner;
 use gridweave_logs::names::rename_advice;
 use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::ros::{LaserScan, MultiEchoLaserScan, OccupancyGrid, Odometry, RosMessage, TFMessage};
@@ -186,21 +186,21 @@ fn namespace(node: &str) -> Option<&str> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::census::Census;
-    use super::super::census::tests::publisher;
+    use super::super::discovery::publishers::DiscoveredPublishers;
+    use super::super::discovery::publishers::tests::publisher;
     use super::*;
 
     /// What is found where these nodes, each with its namespace, publish.
     fn found(published: &[(&str, &str, &str, &str)]) -> Findings {
-        let mut census = Census::default();
+        let mut publishers = DiscoveredPublishers::default();
         for (number, (namespace, node, topic, ros_type)) in (0..).zip(published) {
             let entity = publisher([namespace, node], topic, ros_type, number);
             let owner = if *node == "gridweave_ros" { Owner::OtherRun } else { Owner::Other };
             for middleware in [Middleware::Dds, Middleware::Zenoh] {
-                census.note(middleware, entity.clone(), owner, true);
+                publishers.note(middleware, entity.clone(), owner, true);
             }
         }
-        Findings::new(&census.topics(), &RobotTopics::default())
+        Findings::new(&publishers.topics(), &RobotTopics::default())
     }
 
     #[track_caller]
@@ -224,7 +224,7 @@ mod tests {
 
     /// slam_toolbox publishes `/map` in whatever namespace it is.
     #[test]
-    fn nodes_that_publish_one_map_in_their_namespaces_are_told_to_remap_it() {
+    fn the_advice_for_nodes_that_publish_one_map_is_to_remap_it() {
         advised(
             &[("/robot1", "slam_toolbox", "/map", MAP), ("/robot2", "slam_toolbox", "/map", MAP)],
             &["/robot1/slam_toolbox and /robot2/slam_toolbox", "-r /map:=map", "`/robot1/map` and `/robot2/map`"],
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn maps_below_a_further_name_are_told_with_their_pattern() {
+    fn the_advice_for_maps_below_a_further_name_has_their_pattern() {
         let pattern = "map = \"/fleet/{robot}/map\"";
         advised(&[("/", "a", "/fleet/robot1/map", MAP), ("/", "b", "/fleet/robot2/map", MAP)], &[pattern]);
         advised(&[("/", "a", "/fleet/robot1/map", MAP)], &[pattern]);
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn robots_with_scans_are_told_of_the_pipeline_that_draws_maps_of_them() {
+    fn the_advice_for_robots_with_scans_is_the_pipeline_that_builds_maps() {
         let scans = |robot: &'static str| ("/", "lidar", robot, LaserScan::NAME);
         let odometry = ("/", "base", "/robot1/odom", Odometry::NAME);
         let both = [scans("/robot1/scan"), scans("/robot2/scan"), odometry];

@@ -6,7 +6,7 @@
 
 use gridweave_runtime::ros::{GridPrefix, Header, OccupancyGrid, OccupancyGridUpdate};
 
-/// An update has at most one in so many cells of the map, because it is sent again after the next whole map.
+/// The map has at least this many times the cells of an update, because it is sent again after the next whole map.
 const MAX_SHARE_DIVISOR: usize = 4;
 
 /// A rectangle of cells.
@@ -40,7 +40,7 @@ pub(crate) struct SentMap {
     cells: Vec<u8>,
     /// The part covered by the last update; `None` if there was none after the whole map.
     covered: Option<Rectangle>,
-    /// How many cells all updates after the whole map have brought.
+    /// The number of cells in all updates after the whole map.
     updated_cells: usize,
     /// The part covered by updates before the whole map. Maps and updates have separate topics, so a subscriber may
     /// receive them in another order.
@@ -67,28 +67,28 @@ impl SentMap {
         is_whole.then(|| Self { prefix, whole: cells.clone(), cells, covered: None, updated_cells: 0, outdated: None })
     }
 
-    /// Takes up the next map, and says what is to be sent of it. It is the whole map where another place, size or frame
-    /// calls for that, or a large part has changed, or not everybody hears updates, and once updates would have brought
-    /// as many cells as the map has: so no more is sent than twice what had to be.
+    /// Records the next map and returns the part to send: all of it if its origin, size or frame changed, if a large part
+    /// changed, or if a subscriber gets no updates. It is also sent whole once updates would have as many cells as the
+    /// map, so that at most twice the necessary cells are sent.
     pub(crate) fn take(&mut self, map: &OccupancyGrid<'_>, receives_updates: bool) -> Part {
         let (before, info) = (&self.prefix.info, &map.info);
-        let lies_alike = self.prefix.header.frame_id == map.header.frame_id
+        let has_same_geometry = self.prefix.header.frame_id == map.header.frame_id
             && (before.resolution, before.width, before.height, before.origin)
                 == (info.resolution, info.width, info.height, info.origin)
             && self.cells.len() == map.data.len();
-        if lies_alike && self.cells == map.data {
+        if has_same_geometry && self.cells == map.data {
             return Part::Nothing;
         }
         self.prefix = GridPrefix { header: map.header.clone(), info: map.info };
         self.cells.clear();
         self.cells.extend_from_slice(map.data);
-        let changed = difference(&self.whole, map.data, info.width as usize).filter(|_| lies_alike);
+        let changed = difference(&self.whole, map.data, info.width as usize).filter(|_| has_same_geometry);
         let part = match (changed, self.covered) {
             (Some(changed), Some(covered)) => Some(changed.with(covered)),
             (changed, covered) => changed.or(covered),
         };
         let is_small = |part: &Rectangle| part.cell_count() <= self.cells.len() / MAX_SHARE_DIVISOR;
-        let may_update = lies_alike && receives_updates && part.as_ref().is_some_and(is_small);
+        let may_update = has_same_geometry && receives_updates && part.as_ref().is_some_and(is_small);
         match part.filter(|part| may_update && self.updated_cells.saturating_add(part.cell_count()) < self.cells.len())
         {
             Some(part) => {
@@ -188,7 +188,7 @@ mod tests {
         assert!(!sent.is_updated());
         (cells[9], cells[18]) = (1, 2);
         assert_eq!(sent.take(&map(8, 5, &cells), true), part([1, 1], [3, 3]));
-        // What was told is taken back: whoever has the update must be told.
+        // Reverted cells must be sent too, to subscribers that applied the update.
         (cells[9], cells[18], cells[12]) = (0, 0, 7);
         assert_eq!(sent.take(&map(8, 5, &cells), true), part([1, 1], [5, 3]));
         assert_eq!(sent.take(&map(8, 5, &cells), true), Part::Nothing);
@@ -200,10 +200,14 @@ mod tests {
         assert_eq!((update.data, update.header.frame_id.as_str()), (&[0, 0, 0, 7, 0, 0, 0, 0][..], "world"));
         assert_eq!(sent.whole().data, cells);
         assert!(!sent.is_updated());
-        assert_eq!(sent.take_outdated().map(Part::Update), Some(part([1, 1], [5, 3])), "the update may come behind it");
+        assert_eq!(
+            sent.take_outdated().map(Part::Update),
+            Some(part([1, 1], [5, 3])),
+            "the update may arrive after it"
+        );
         assert_eq!(sent.take_outdated(), None);
         cells[0] = 1;
-        assert_eq!(sent.take(&map(8, 5, &cells), false), Part::Whole, "not everybody hears updates");
+        assert_eq!(sent.take(&map(8, 5, &cells), false), Part::Whole, "a subscriber gets no updates");
         assert_eq!(sent.take_outdated(), None);
     }
 
@@ -234,7 +238,7 @@ mod tests {
         cells[39] = 1;
         assert_eq!(sent.take(&map(8, 5, &cells), true), part([7, 4], [8, 5]));
         assert_eq!(sent.take(&map(5, 8, &cells), true), Part::Whole);
-        assert_eq!(sent.take_outdated(), None, "it lies outside of the other map, and is refused there");
+        assert_eq!(sent.take_outdated(), None, "it is outside of the other map, where it is refused");
         let mut moved = map(5, 8, &cells);
         moved.info.origin.position.x = 0.05;
         assert_eq!(sent.take(&moved, true), Part::Whole);
@@ -247,7 +251,7 @@ mod tests {
         assert!(SentMap::new(&map(8, 5, &cells)).is_none() && SentMap::new(&map(0, 0, &[])).is_some());
     }
 
-    /// A listener that has a map.
+    /// Applies an update to a subscriber's map.
     fn apply(to: &mut [u8], width: usize, update: &OccupancyGridUpdate<'_>) {
         for (row, cells) in update.data.chunks_exact(update.width as usize).enumerate() {
             let start = (update.y as usize + row) * width + update.x as usize;
@@ -257,14 +261,14 @@ mod tests {
 
     proptest! {
         #[test]
-        fn whoever_has_the_last_whole_map_has_the_map_after_any_updates(
+        fn a_subscriber_with_the_last_whole_map_has_the_map_after_any_updates(
             maps in prop::collection::vec(prop::collection::vec((0..30_usize, 0..3_u8), 0..4), 1..20),
             misses in prop::collection::vec(any::<bool>(), 20),
         ) {
             let (width, height) = (6, 5);
             let mut cells = vec![0; 30];
             let mut sent = SentMap::new(&map(width, height, &cells)).unwrap();
-            // One who hears everything, and one who misses updates, but for the last.
+            // One subscriber receives everything; another misses updates, except the last.
             let (mut all, mut some) = (cells.clone(), cells.clone());
             for (changes, is_missed) in maps.iter().zip(misses) {
                 for (cell, value) in changes {

@@ -1,9 +1,9 @@
 //! The connection of a stage to the network of ROS 2 programs.
 
 use super::dds_node::DdsNode;
+use super::discovery::node_identity::NodeIdentity;
 use super::discovery_range::{DiscoveryRange, static_peers};
 use super::middleware::{Middleware, Middlewares};
-use super::own_name::OwnName;
 use super::rtps::LAST_DOMAIN;
 use gridweave_bridge::zenoh_session::{file_config, join, peer_config};
 use gridweave_runtime::stage::{ParameterError, StageError};
@@ -83,7 +83,7 @@ impl Connection {
     ///
     /// # Errors
     /// The environment wants nobody to be found, or the system refuses the sockets.
-    pub(crate) fn join_dds(&self, domain: u32, name: &OwnName) -> Result<DdsNode, StageError> {
+    pub(crate) fn join_dds(&self, domain: u32, name: &NodeIdentity) -> Result<DdsNode, StageError> {
         let range = match self.discovery_range {
             Some(range) => Some(range),
             None => DiscoveryRange::of_environment()?,
@@ -147,8 +147,8 @@ mod tests {
 
     #[test]
     fn a_domain_that_dds_does_not_have_is_wrong_unless_it_is_one_of_zenoh() {
-        let told = wrong(Some(233), Middlewares::Auto);
-        assert!(told.len() == 1 && told[0].contains("end at 232"), "{told:?}");
+        let errors = wrong(Some(233), Middlewares::Auto);
+        assert!(errors.len() == 1 && errors[0].contains("end at 232"), "{errors:?}");
         assert_eq!(
             (wrong(Some(232), Middlewares::Dds), wrong(Some(300), Middlewares::Zenoh)),
             (Vec::new(), Vec::new())

@@ -16,7 +16,7 @@ pub(crate) const NAMES_TOPIC: &str = "ros_discovery_info";
 pub(crate) const TOPIC_PREFIX: &str = "rt";
 /// So long the name of an endpoint's node is waited for.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// So long a mismatch may last before it is reported: who subscribes here may subscribe again with what all offer, once
+/// So long a mismatch may last before it is reported: a subscriber here may subscribe again with what all offer, once
 /// it is known whose the endpoint is.
 const MISMATCH_PATIENCE: Duration = Duration::from_secs(2);
 
@@ -29,14 +29,14 @@ type OnEntity = Box<dyn Fn(Entity, bool) + Send + Sync>;
 /// The nodes of others.
 pub(crate) struct Graph {
     domain: u32,
-    seen: Mutex<Seen>,
+    seen: Mutex<SeenTopic>,
     watchers: Mutex<Vec<OnEntity>>,
     /// Problems that were not taken yet.
     problems: Mutex<Vec<String>>,
 }
 
 #[derive(Default)]
-struct Seen {
+struct SeenTopic {
     /// The nodes of endpoints.
     names: BTreeMap<Guid, NodeName>,
     /// The participants that publish such names.
@@ -90,7 +90,7 @@ impl Graph {
     fn settle(&self) {
         let now = Instant::now();
         let mut seen = lock(&self.seen);
-        let Seen { names, nameless, entities, mismatches, reported_mismatches, .. } = &mut *seen;
+        let SeenTopic { names, nameless, entities, mismatches, reported_mismatches, .. } = &mut *seen;
         let is_ready = |since: Instant, guid: &Guid| names.contains_key(guid) || now.duration_since(since) >= PATIENCE;
         let mut new = Vec::new();
         nameless.retain(|guid, (since, endpoint)| {
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mismatch_of_an_endpoint_that_is_no_more_is_not_told() {
+    fn a_mismatch_of_an_endpoint_that_is_gone_is_not_reported() {
         let graph = Graph::new(0);
         let (here, there) = (endpoint(1, "rt/map"), endpoint(2, "rt/map"));
         let mismatch = || Mismatch { here: here.clone(), there: there.clone(), policies: vec!["reliability"] };
@@ -288,21 +288,21 @@ mod tests {
     }
 
     #[test]
-    fn types_are_told_with_their_hashes_only_where_their_names_are_one() {
+    fn types_are_reported_with_their_hashes_only_if_their_names_are_equal() {
         let hash = |digit: &str| Some(format!("RIHS01_{}", digit.repeat(64)));
         let here = EndpointData { type_hash: hash("a"), ..endpoint(1, "rt/map") };
         let there = EndpointData { type_hash: hash("b"), ..endpoint(2, "rt/map") };
-        let told = |here: &EndpointData| {
+        let problem = |here: &EndpointData| {
             problem(&Mismatch { here: here.clone(), there: there.clone(), policies: Vec::new() }, None)
         };
-        let text = told(&here);
+        let text = problem(&here);
         assert!(text.contains("OccupancyGrid (RIHS01_bbbbbbbb), and") && text.contains("(RIHS01_aaaaaaaa):"), "{text}");
-        let text = told(&EndpointData { type_name: "std_msgs::msg::dds_::String_".into(), ..here });
+        let text = problem(&EndpointData { type_name: "std_msgs::msg::dds_::String_".into(), ..here });
         assert!(text.contains("std_msgs/msg/String:") && !text.contains("RIHS01"), "{text}");
     }
 
     #[test]
-    fn a_mismatch_is_told_once_with_the_settings_of_both_sides() {
+    fn a_mismatch_is_reported_once_with_the_settings_of_both_sides() {
         let graph = Graph::new(0);
         let (here, there) = (endpoint(1, "rt/map"), endpoint(2, "rt/map"));
         let here = EndpointData { policies: Policies::new(false, false, Some(5)), ..here };
@@ -311,7 +311,7 @@ mod tests {
         for _ in 0..2 {
             graph.mismatch(&Mismatch { here: here.clone(), there: there.clone(), policies: vec!["reliability"] });
             graph.tick();
-            assert!(graph.take_problems().is_empty(), "who subscribes may do so again");
+            assert!(graph.take_problems().is_empty(), "a subscriber may subscribe again");
         }
         wait_out(&graph);
         let problems = graph.take_problems();

@@ -3,9 +3,9 @@
 
 use super::dds_graph::{Graph, NAMES_TOPIC, TOPIC_PREFIX};
 use super::dds_names::{self, NodeName, TYPE, TYPE_HASH};
+use super::discovery::node_identity::NodeIdentity;
 use super::key_expression::{NO_HASH, Topic, type_in_keys};
 use super::liveliness::Entity;
-use super::own_name::OwnName;
 use super::qos::Qos;
 use super::rtps::{EndpointData, EntityId, Guid, LAST_DOMAIN, Participant, Policies, Reach, Reading, Sample, Writing};
 use gridweave_runtime::stage::StageError;
@@ -34,7 +34,12 @@ impl DdsNode {
     ///
     /// # Errors
     /// There is no such domain, or the system refuses the sockets.
-    pub(crate) fn start(domain: u32, name: &OwnName, reach: Reach, peers: &[Ipv4Addr]) -> Result<Self, StageError> {
+    pub(crate) fn start(
+        domain: u32,
+        name: &NodeIdentity,
+        reach: Reach,
+        peers: &[Ipv4Addr],
+    ) -> Result<Self, StageError> {
         let doing = "join the DDS network";
         if domain > LAST_DOMAIN {
             let error = StageError::new(doing, format!("there is no domain {domain}"));

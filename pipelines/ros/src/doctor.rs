@@ -1,12 +1,12 @@
 //! The verb `doctor`: what robots there are on the network, and what is missing for a merge.
 
 use super::advice::Findings;
-use super::census::{Census, Published, Topics};
 use super::definitions::Definitions;
-use super::doctor_hearing::Hearing;
+use super::discovery::doctor_subscriptions::DoctorSubscriptions;
+use super::discovery::node_identity::NodeIdentity;
+use super::discovery::publishers::{DiscoveredPublishers, Published, Topics};
 use super::key_expression::NO_HASH;
 use super::node::Node;
-use super::own_name::OwnName;
 use super::qos::Qos;
 use super::source_parameters::SourceParameters;
 use anyhow::{Result, bail};
@@ -19,7 +19,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// So often it is looked for topics to hear.
+/// The interval between two checks for topics to subscribe to.
 const PERIOD: Duration = Duration::from_millis(100);
 
 /// The verb `doctor`.
@@ -37,26 +37,26 @@ fn look(parameters: toml::Table, longest: Duration) -> Result<String> {
         bail!("{wrong}");
     }
     let definitions = Definitions::new(&parameters.definitions);
-    let name = OwnName::of_program("doctor", parameters.node.as_ref());
+    let name = NodeIdentity::of_program("doctor", parameters.node.as_ref());
     let mut node = Node::start(parameters.connection(), name.clone())?;
-    let census = Arc::<Mutex<Census>>::default();
-    let to = Arc::clone(&census);
+    let publishers = Arc::<Mutex<DiscoveredPublishers>>::default();
+    let to = Arc::clone(&publishers);
     node.watch(move |middleware, entity, is_there| {
         let owner = name.owner(&entity);
         to.lock().unwrap_or_else(PoisonError::into_inner).note(middleware, entity, owner, is_there);
     })?;
-    let topics = || census.lock().unwrap_or_else(PoisonError::into_inner).topics();
+    let topics = || publishers.lock().unwrap_or_else(PoisonError::into_inner).topics();
     let (robots, until) = (RobotTopics::default(), Instant::now() + longest);
-    let mut hearing = Hearing::default();
+    let mut subscriptions = DoctorSubscriptions::default();
     // Who is there says so again and again.
     while let Some(rest) = until.checked_duration_since(Instant::now()) {
-        hearing.hear(&mut node, &topics(), &robots)?;
+        subscriptions.subscribe(&mut node, &topics(), &robots)?;
         thread::sleep(rest.min(PERIOD));
     }
     let topics = topics();
     let mut text = networks(&node);
     write_topics(&mut text, &topics, &definitions)?;
-    write_robots(&mut text, &Findings::new(&topics, &robots), &hearing, &robots)?;
+    write_robots(&mut text, &Findings::new(&topics, &robots), &subscriptions, &robots)?;
     for problem in node.take_problems() {
         writeln!(text, "warning: {problem}")?;
     }
@@ -102,7 +102,12 @@ fn write_topics(text: &mut String, topics: &Topics, definitions: &Definitions) -
 }
 
 /// Says which robots have a map, what is missing for a merge, and what to write.
-fn write_robots(text: &mut String, findings: &Findings, hearing: &Hearing, robots: &RobotTopics) -> std::fmt::Result {
+fn write_robots(
+    text: &mut String,
+    findings: &Findings,
+    subscriptions: &DoctorSubscriptions,
+    robots: &RobotTopics,
+) -> std::fmt::Result {
     for (topic, nodes) in &findings.merged {
         match nodes.as_slice() {
             [node] => writeln!(text, "`{topic}` of {node} is a map that a run of Gridweave publishes, and no robot's")?,
@@ -115,8 +120,8 @@ fn write_robots(text: &mut String, findings: &Findings, hearing: &Hearing, robot
         }
     }
     for (robot, nodes) in &findings.maps {
-        let seen = hearing.map(&robots.map.replace("{robot}", robot));
-        writeln!(text, "{robot} has a map, {seen}{}", hearing.tree(robot))?;
+        let seen = subscriptions.map(&robots.map.replace("{robot}", robot));
+        writeln!(text, "{robot} has a map, {seen}{}", subscriptions.tree(robot))?;
         if nodes.len() > 1 {
             let (count, nodes) = (nodes.len(), list_in_words(nodes));
             writeln!(text, "warning: {robot} has {count} maps, of {nodes}: are there two robots of one name?")?;
@@ -124,9 +129,9 @@ fn write_robots(text: &mut String, findings: &Findings, hearing: &Hearing, robot
     }
     for (robot, moves) in &findings.scanning {
         let lack = if *moves { "" } else { ", and no odometry, poses or tf" };
-        writeln!(text, "{robot} has scans and no map{lack}{}", hearing.tree(robot))?;
+        writeln!(text, "{robot} has scans and no map{lack}{}", subscriptions.tree(robot))?;
     }
-    if let Some(tree) = hearing.shared_tree() {
+    if let Some(tree) = subscriptions.shared_tree() {
         writeln!(text, "{tree}")?;
     }
     for (topic, ros_type) in &findings.wrong_types {

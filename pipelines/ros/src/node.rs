@@ -3,10 +3,10 @@
 use super::attachment::Attachment;
 use super::connection::Connection;
 use super::dds_node::{DdsNode, DdsPublisher, DdsSubscriber};
+use super::discovery::node_identity::NodeIdentity;
 use super::key_expression::Topic;
 use super::liveliness::Entity;
 use super::middleware::{Middleware, Middlewares};
-use super::own_name::OwnName;
 use super::qos::Qos;
 use super::rtps;
 use super::zenoh_node::{ZenohNode, ZenohPublisher, ZenohSubscriber};
@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 /// A node.
 pub(crate) struct Node {
-    name: OwnName,
+    name: NodeIdentity,
     domain: u32,
     dds: Option<DdsNode>,
     zenoh: Option<ZenohNode>,
@@ -75,7 +75,7 @@ impl Node {
     ///
     /// # Errors
     /// The network cannot be joined. Where either middleware would do, that is only so if neither can.
-    pub(crate) fn start(connection: Connection, name: OwnName) -> Result<Self, StageError> {
+    pub(crate) fn start(connection: Connection, name: NodeIdentity) -> Result<Self, StageError> {
         let domain = connection.domain()?;
         let middlewares = connection.middleware;
         let dds = match middlewares.has(Middleware::Dds) {
@@ -101,7 +101,7 @@ impl Node {
     }
 
     /// Its name.
-    pub(crate) const fn name(&self) -> &OwnName {
+    pub(crate) const fn name(&self) -> &NodeIdentity {
         &self.name
     }
 

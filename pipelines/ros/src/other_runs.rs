@@ -1,8 +1,8 @@
 //! Other runs of Gridweave that publish what this one publishes, too.
 
+use super::discovery::node_identity::Owner;
 use super::liveliness::{Entity, Kind};
 use super::node::Node;
-use super::own_name::Owner;
 use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::stage::StageError;
 use std::collections::{BTreeMap, BTreeSet};
@@ -68,11 +68,11 @@ fn note(topics: &mut BTreeMap<String, BTreeSet<String>>, entity: &Entity, is_the
 
 #[cfg(test)]
 mod tests {
-    use super::super::census::tests::publisher;
+    use super::super::discovery::publishers::tests::publisher;
     use super::*;
 
     #[test]
-    fn a_node_of_another_run_is_told_once_with_what_both_publish() {
+    fn a_node_of_another_run_is_reported_once_with_the_common_topics() {
         let mut others = OtherRuns { topics: Arc::default(), warned: BTreeSet::new() };
         let node = ["/", "gridweave_ros"];
         let of = |topic| publisher(node, topic, "nav_msgs/msg/OccupancyGrid", 1);

@@ -1,8 +1,8 @@
 //! The tf trees of single robots: on `/robot1/tf`, with frames without the robot's name.
 
+use super::discovery::node_identity::Owner;
 use super::liveliness::{Entity, Kind};
 use super::node::Node;
-use super::own_name::Owner;
 use gridweave_logs::tf::tf_topic;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::TransformStamped;

@@ -1,16 +1,16 @@
 //! The stage `ros_sink`: publishes results as a ROS 2 node.
 
 use super::connection::{Connection, LISTEN, ROUTER};
+use super::discovery::node_identity::NodeIdentity;
 use super::discovery_range::DiscoveryRange;
 use super::key_expression::Topic;
 use super::map_topics::{MapTopics, Sent};
 use super::middleware::Middlewares;
 use super::node::{Node, Publisher};
 use super::other_runs::OtherRuns;
-use super::own_name::OwnName;
+use super::published_frames::{Change, PublishedFrames};
 use super::qos::Qos;
 use super::robot_trees::{RobotTrees, in_robot_tree};
-use super::settled_frames::{Change, SettledFrames};
 use gridweave_logs::names::TopicRename;
 use gridweave_logs::qos;
 use gridweave_logs::tf::is_static;
@@ -137,7 +137,7 @@ struct RosSink {
     types: Vec<String>,
     /// The publishers by topic; none for a topic that cannot be published.
     publishers: BTreeMap<String, Option<Publisher>>,
-    frames: SettledFrames,
+    frames: PublishedFrames,
     trees: RobotTrees,
     /// The frames published in the robots' own trees, by robot.
     published_in_trees: BTreeMap<String, Vec<TransformStamped>>,
@@ -152,7 +152,7 @@ impl RosSink {
         }
         let doing = || format!("make the stage `{}`", context.stage);
         let renames = parameters.renames().map_err(|wrong| StageError::new(doing(), wrong))?;
-        let name = OwnName::of_stage(context, parameters.node.as_ref());
+        let name = NodeIdentity::of_stage(context, parameters.node.as_ref());
         let name = if parameters.as_robot { name.into_robot() } else { name };
         let node = Node::start(parameters.connection(), name)?;
         Ok(Self {
@@ -164,7 +164,7 @@ impl RosSink {
             renames,
             types: context.inputs.iter().map(|wire| wire.ros_type.clone()).collect(),
             publishers: BTreeMap::new(),
-            frames: SettledFrames::default(),
+            frames: PublishedFrames::default(),
         })
     }
 
@@ -177,7 +177,7 @@ impl RosSink {
         if ros_type == RobotFrames::NAME
             && let Ok(frames) = message.decode::<RobotFrames>()
         {
-            self.frames.learn(&frames);
+            self.frames.set_covariances(&frames);
         }
         if ros_type == TFMessage::NAME && is_static(&topic) {
             return match message.decode::<TFMessage>() {
@@ -233,7 +233,7 @@ impl RosSink {
     }
 
     /// Publishes the static transforms of all frames in one message, because a publisher retains its last message only.
-    /// Settled frames are unchanged.
+    /// Frames that moved by no more than their uncertainty are unchanged.
     fn publish_frames(&mut self, topic: &str, message: &TFMessage, output: &Output<()>) -> Result<(), StageError> {
         let mut is_changed = false;
         for transform in &message.transforms {
@@ -244,7 +244,7 @@ impl RosSink {
         if !is_changed {
             return Ok(());
         }
-        let transforms = self.frames.told().cloned().collect();
+        let transforms = self.frames.transforms().cloned().collect();
         self.publish_transforms(topic, transforms, output)?;
         self.publish_in_robot_trees(output)
     }
@@ -252,7 +252,8 @@ impl RosSink {
     /// Publishes the frames of robots with their own tf trees there too, with their names in these trees.
     fn publish_in_robot_trees(&mut self, output: &Output<()>) -> Result<(), StageError> {
         for (robot, topic) in self.trees.topics() {
-            let transforms: Vec<_> = self.frames.told().filter_map(|told| in_robot_tree(&robot, told)).collect();
+            let transforms: Vec<_> =
+                self.frames.transforms().filter_map(|transform| in_robot_tree(&robot, transform)).collect();
             if !transforms.is_empty() && self.published_in_trees.get(&robot) != Some(&transforms) {
                 self.published_in_trees.insert(robot, transforms.clone());
                 self.publish_transforms(&topic, transforms, output)?;
@@ -311,8 +312,8 @@ fn report_change(transform: &TransformStamped, change: &Change, output: &Output<
             let degrees = angle.to_degrees();
             tracing::warn!("`{child}` has moved in `{parent}` by {distance:.3} m and {degrees:.2} degrees");
         }
-        Change::Held => output.count("changes of frames within their uncertainty, not published", 1),
-        Change::Same => {}
+        Change::WithinUncertainty => output.count("changes of frames within their uncertainty, not published", 1),
+        Change::Unchanged => {}
         Change::OtherParent { before } => {
             output
                 .warn(format!("`{child}` stays in `{before}`: a published frame cannot get the new parent `{parent}`"));

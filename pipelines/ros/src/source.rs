@@ -2,16 +2,16 @@
 
 use super::dds_graph::short_hash;
 use super::definitions::Definitions;
-use super::double_publishers;
+use super::discovery::duplicate_publisher_warning;
+use super::discovery::no_robot_warning::NoRobotWarning;
+use super::discovery::node_identity::{NodeIdentity, Owner};
+use super::discovery::topics::{OfferedTopic, SeenTopic};
 use super::inbox::{Event, Inbox};
 use super::key_expression::{NO_HASH, Topic};
 use super::liveliness::{Entity, Kind};
 use super::middleware::Middleware;
 use super::node::{Node, Received, Subscriber};
-use super::offered::{Offered, Seen};
-use super::own_name::{OwnName, Owner};
 use super::qos::Qos;
-use super::silence::Silence;
 use super::source_parameters::SourceParameters;
 use gridweave_bridge::clock::nanoseconds_now;
 use gridweave_logs::qos;
@@ -46,7 +46,7 @@ pub struct RosSource {
     definitions: Definitions,
     keep_last: usize,
     /// The topics that were ever seen.
-    topics: BTreeMap<Offered, Seen>,
+    topics: BTreeMap<OfferedTopic, SeenTopic>,
     /// Publishers of scans of robots that may yet publish a map, and since when they are known.
     waiting_scans: Vec<(Instant, Middleware, Entity)>,
     wait_for_map: Duration,
@@ -54,11 +54,11 @@ pub struct RosSource {
     robots: RobotTopics,
     /// The identifiers on Zenoh of publishers of Gridweave.
     left_out: BTreeSet<[u8; 16]>,
-    silence: Silence,
+    no_robot_warning: NoRobotWarning,
     /// When the maps with updates were sent last.
     updates_sent: Instant,
-    /// Those of the topics that are heard.
-    subscribers: BTreeMap<Offered, Subscriber>,
+    /// The subscribers of the received topics.
+    subscribers: BTreeMap<OfferedTopic, Subscriber>,
     /// Warnings that were given.
     warned: BTreeSet<String>,
     log_time: u64,
@@ -70,7 +70,7 @@ impl RosSource {
     /// # Errors
     /// It cannot be joined.
     pub fn new(parameters: SourceParameters, context: &Context) -> Result<Self, StageError> {
-        let name = OwnName::of_stage(context, parameters.node.as_ref());
+        let name = NodeIdentity::of_stage(context, parameters.node.as_ref());
         let node = Node::start(parameters.connection(), name)?;
         let duration = |seconds| Duration::try_from_secs_f64(seconds).unwrap_or_default();
         let inbox = Arc::new(Inbox::default());
@@ -89,7 +89,7 @@ impl RosSource {
             update_period: duration(parameters.update_period),
             robots: context.robots.clone(),
             left_out: BTreeSet::new(),
-            silence: Silence::new(duration(parameters.discovery_timeout)),
+            no_robot_warning: NoRobotWarning::new(duration(parameters.discovery_timeout)),
             updates_sent: Instant::now(),
             subscribers: BTreeMap::new(),
             warned: BTreeSet::new(),
@@ -110,7 +110,7 @@ impl RosSource {
             return Ok(());
         }
         let owner = self.node.name().owner(&entity);
-        self.silence.note(middleware, entity.clone(), owner, is_there);
+        self.no_robot_warning.note(middleware, entity.clone(), owner, is_there);
         if owner != Owner::Other {
             match is_there {
                 true => self.left_out.insert(entity.gid()),
@@ -128,7 +128,7 @@ impl RosSource {
             }
             return Ok(());
         }
-        let offered = Offered { topic, middleware };
+        let offered = OfferedTopic { topic, middleware };
         if !is_there {
             self.waiting_scans.retain(|(_, _, waiting)| *waiting != entity);
             if let Some(seen) = self.topics.get_mut(&offered) {
@@ -161,7 +161,7 @@ impl RosSource {
         self.waiting_scans = waiting;
         for (_, middleware, entity) in ready {
             let Kind::Publisher(topic, qos) = entity.kind.clone() else { continue };
-            self.add_publisher(Offered { topic, middleware }, qos, entity, output)?;
+            self.add_publisher(OfferedTopic { topic, middleware }, qos, entity, output)?;
         }
         Ok(())
     }
@@ -169,7 +169,7 @@ impl RosSource {
     /// Takes up what publishes a topic.
     fn add_publisher(
         &mut self,
-        offered: Offered,
+        offered: OfferedTopic,
         qos: Qos,
         entity: Entity,
         output: &Output<RobotMessages>,
@@ -178,7 +178,7 @@ impl RosSource {
             Some(seen) => {
                 seen.publishers.insert(entity);
                 let qos = seen.offered_by_all();
-                // On DDS nobody is heard who offers less than what is requested.
+                // On DDS a publisher that offers less than what is requested does not match.
                 if offered.middleware == Middleware::Dds && seen.qos != qos {
                     self.subscribers.remove(&offered);
                 }
@@ -187,7 +187,7 @@ impl RosSource {
             }
             None => {
                 let number = self.router.add(self.channel(&offered.topic, qos));
-                let seen = Seen { number, qos, publishers: BTreeSet::from([entity]) };
+                let seen = SeenTopic { number, qos, publishers: BTreeSet::from([entity]) };
                 self.topics.insert(offered.clone(), seen);
                 number
             }
@@ -250,17 +250,17 @@ impl RosSource {
     }
 
     /// The same topic on another middleware, if it is heard there.
-    fn on_another_middleware(&self, offered: &Offered) -> Option<Offered> {
+    fn on_another_middleware(&self, offered: &OfferedTopic) -> Option<OfferedTopic> {
         let is_other =
-            |other: &&Offered| other.topic.name == offered.topic.name && other.middleware != offered.middleware;
+            |other: &&OfferedTopic| other.topic.name == offered.topic.name && other.middleware != offered.middleware;
         self.subscribers.keys().find(is_other).cloned()
     }
 
     /// Hears no more of topics that are of no use any longer, as another one has taken their place.
     fn leave_topics(&mut self) {
         let (topics, router) = (&self.topics, &self.router);
-        let is_left = |offered: &&Offered| topics.get(*offered).is_none_or(|seen| !router.is_of_use(seen.number));
-        let left: Vec<Offered> = self.subscribers.keys().filter(is_left).cloned().collect();
+        let is_left = |offered: &&OfferedTopic| topics.get(*offered).is_none_or(|seen| !router.is_of_use(seen.number));
+        let left: Vec<OfferedTopic> = self.subscribers.keys().filter(is_left).cloned().collect();
         for offered in left {
             self.subscribers.remove(&offered);
             let topic = offered.topic;
@@ -275,16 +275,16 @@ impl RosSource {
     }
 
     /// Two programs that publish the map or the pose of one robot are two robots of one name.
-    fn check_publishers(&mut self, offered: &Offered, number: usize, output: &Output<RobotMessages>) {
+    fn check_publishers(&mut self, offered: &OfferedTopic, number: usize, output: &Output<RobotMessages>) {
         if !self.router.is_of_one_robot(number) {
             return;
         }
         let name = offered.topic.name.as_str();
-        let is_same = |other: &Offered| other.topic.name == name && other.middleware == offered.middleware;
+        let is_same = |other: &OfferedTopic| other.topic.name == name && other.middleware == offered.middleware;
         let of_name = self.topics.iter().filter(|(other, _)| is_same(other));
         let publishers: Vec<&Entity> = of_name.flat_map(|(_, seen)| &seen.publishers).collect();
         if publishers.len() > 1 {
-            output.warn(double_publishers::warning(name, &publishers));
+            output.warn(duplicate_publisher_warning::warning(name, &publishers));
         }
     }
 
@@ -332,13 +332,15 @@ impl RosSource {
         self.router.send(number, message, output)
     }
 
-    /// Warns of a domain in which nobody is heard, and of what other nodes do wrong.
+    /// Warns of a domain without publishers, and of errors of other nodes.
     fn check_network(&mut self, output: &Output<RobotMessages>) {
         // They were logged already.
         self.node.take_problems().into_iter().for_each(|problem| output.warn_logged(problem));
         let hears_any = !self.subscribers.is_empty() || !self.waiting_scans.is_empty();
-        let texts =
-            [self.silence.warning(&self.node), self.silence.misfit(&self.robots, [hears_any, output.takes_scans()])];
+        let texts = [
+            self.no_robot_warning.warning(&self.node),
+            self.no_robot_warning.misfit(&self.robots, [hears_any, output.takes_scans()]),
+        ];
         texts.into_iter().flatten().for_each(|text| self.warn_once(text, output));
     }
 }

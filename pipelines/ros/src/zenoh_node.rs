@@ -2,9 +2,9 @@
 
 use super::attachment::Attachment;
 use super::connection::Connection;
+use super::discovery::node_identity::NodeIdentity;
 use super::key_expression::Topic;
 use super::liveliness::{Entity, Kind};
-use super::own_name::OwnName;
 use super::qos::Qos;
 use gridweave_bridge::clock::nanoseconds_now;
 use gridweave_bridge::zenoh_session::{in_words, is_connected};
@@ -40,7 +40,7 @@ impl ZenohNode {
     ///
     /// # Errors
     /// The network cannot be joined.
-    pub(crate) fn start(connection: Connection, domain: u32, name: &OwnName) -> Result<Self, StageError> {
+    pub(crate) fn start(connection: Connection, domain: u32, name: &NodeIdentity) -> Result<Self, StageError> {
         let session = connection.open()?;
         let identity = Entity {
             domain,

@@ -22,7 +22,7 @@ impl Assembly {
         is_possible.then(|| Self { sample_size, fragment_size, fragments: BTreeMap::new() })
     }
 
-    /// Takes up consecutive fragments, if they are as the first ones said.
+    /// Adds consecutive fragments, if they agree with the first ones.
     pub(crate) fn add(&mut self, first: u32, sizes: (u32, u16), payload: &[u8]) {
         if sizes != (self.sample_size, self.fragment_size) {
             return;

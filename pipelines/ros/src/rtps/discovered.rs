@@ -73,7 +73,7 @@ impl ParticipantData {
     }
 }
 
-/// The lease where none is said (RTPS 2.3, 9.6.2.2).
+/// The lease where none is stated (RTPS 2.3, 9.6.2.2).
 const DEFAULT_LEASE: Duration = Duration::from_secs(100);
 /// No participant is taken to be gone sooner.
 const MIN_LEASE: Duration = Duration::from_secs(2);
@@ -86,7 +86,7 @@ pub(crate) struct EndpointData {
     pub(crate) topic: String,
     /// The name of its type, such as `nav_msgs::msg::dds_::OccupancyGrid_`.
     pub(crate) type_name: String,
-    /// The hash of the type's definition, if it is said, as since Iron.
+    /// The hash of the type's definition, if it is stated, as since Iron.
     pub(crate) type_hash: Option<String>,
     pub(crate) policies: Policies,
     /// Where it is reached, if not where its participant is.
@@ -102,7 +102,7 @@ impl EndpointData {
             topic: String::new(),
             type_name: String::new(),
             type_hash: None,
-            // What holds where nothing is said.
+            // The defaults.
             policies: Policies::new(is_writer, false, Some(1)),
             addresses: Vec::new(),
             enclave: String::new(),

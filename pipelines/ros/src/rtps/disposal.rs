@@ -1,4 +1,5 @@
-//! What says that a participant or an endpoint is no more (RTPS 2.3, 9.6.3.9): its key, with a status beside it.
+//! Dispose and unregister messages of participants and endpoints (RTPS 2.3, 9.6.3.9): a key, and a status in the inline
+//! parameters.
 
 use super::cursor::Cursor;
 use super::guid::{EntityId, Guid, Prefix};
@@ -7,7 +8,7 @@ use super::parameters::{self as id, ParameterList, read};
 /// Disposed of, and unregistered.
 const GONE: u32 = 3;
 
-/// The parameters and the key of an endpoint that is no more.
+/// The inline parameters and the key that dispose of an endpoint.
 pub(crate) fn of_endpoint(guid: Guid) -> [Vec<u8>; 2] {
     sample(id::ENDPOINT_GUID, guid)
 }
@@ -25,7 +26,7 @@ fn sample(key: u16, guid: Guid) -> [Vec<u8>; 2] {
     [inline.into_bytes(), ParameterList::sample().with(key, &guid.to_bytes()).into_bytes()]
 }
 
-/// Who is no more, if that is what the parameters and the key of a sample say.
+/// The participant or endpoint that a sample disposes of, if it does, by its inline parameters and its key.
 pub(crate) fn subject(inline: &[u8], is_little: bool, payload: &[u8]) -> Option<Guid> {
     let mut guid = None;
     let mut is_gone = false;
@@ -52,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_is_no_more_is_read_back() {
+    fn the_disposed_endpoint_is_read_back() {
         let guid = Guid { prefix: Prefix([4; 12]), entity: EntityId::writer(7) };
         let [inline, key] = of_endpoint(guid);
         assert_eq!(subject(&inline, true, &key), Some(guid));

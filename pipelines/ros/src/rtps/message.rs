@@ -33,7 +33,7 @@ impl Message {
     #[must_use]
     pub(crate) fn published(self, time: i64) -> Self {
         let (seconds, nanoseconds) = (time.div_euclid(1_000_000_000), time.rem_euclid(1_000_000_000));
-        // Rounded up, so that who rounds down reads what was written.
+        // Rounded up, so that a reader that rounds down gets the written value.
         let fraction = ((nanoseconds << 32) + 999_999_999) / 1_000_000_000;
         self.part(0x09, 0, |bytes| {
             bytes.extend((seconds as u32).to_le_bytes());

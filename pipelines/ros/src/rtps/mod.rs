@@ -2,10 +2,10 @@
 //! subscribe among Fast DDS and Cyclone DDS. What messages say is not looked into.
 //!
 //! - Participants find each other by multicast, or on known machines one by one ([`network`]), and announce what they
-//!   are ([`discovered`]). Who is not heard of for the time of its lease is gone, and so is who says so ([`disposal`]).
+//!   are ([`discovered`]). A participant is gone if it is silent for the time of its lease, or disposes of itself ([`disposal`]).
 //! - Endpoints are announced by writers of their own. A writer and a reader of one topic and one type match if the
 //!   writer offers what the reader requests ([`policies`]).
-//! - A [`writer`] keeps its last samples, and sends again what reliable readers ask for; who comes late gets them, too,
+//! - A [`writer`] keeps its last samples, and sends again what reliable readers ask for; late joiners get them, too,
 //!   if both sides want that. A [`reader`] puts samples into their order. Large samples come in fragments
 //!   ([`assembly`]).
 //! - What comes from the network is not trusted: what cannot be read is left out, and memory is taken for what has come

@@ -53,11 +53,11 @@ impl Ports {
 /// The sockets of a participant.
 #[derive(Debug)]
 pub(crate) struct Network {
-    /// For what is said of participants and endpoints.
+    /// For discovery messages about participants and endpoints.
     discovery: UdpSocket,
     /// For samples, and from which everything is sent.
     user: UdpSocket,
-    /// For what is said to the whole network.
+    /// For multicast messages.
     multicast: Option<UdpSocket>,
     /// One for each interface.
     multicast_senders: Vec<UdpSocket>,
@@ -93,7 +93,7 @@ impl Network {
         let (sender, receiver) = UnixStream::pair()?;
         sender.set_nonblocking(true)?;
         receiver.set_nonblocking(true)?;
-        // Those who keep to this machine are not reached by multicast.
+        // Participants that keep to this machine are not reached by multicast.
         let peers = [&[Ipv4Addr::LOCALHOST], peers].concat();
         Ok(Self { discovery, user, multicast, multicast_senders, wake: [sender, receiver], ports, addresses, peers })
     }
@@ -106,7 +106,7 @@ impl Network {
         })
     }
 
-    /// Where it hears what is said to the whole network.
+    /// Where it receives multicast messages.
     pub(crate) fn multicast_locator(&self) -> Option<SocketAddrV4> {
         self.multicast.as_ref().map(|_| SocketAddrV4::new(MULTICAST_GROUP, self.ports.multicast()))
     }

@@ -14,7 +14,7 @@ pub(crate) struct Policies {
     pub(crate) is_reliable: bool,
     /// From 0: volatile, transient local, transient, persistent.
     pub(crate) durability: u32,
-    /// The number of messages that are kept; `None` for all, or if it is not said.
+    /// The number of messages that are kept; `None` for all, or if it is unknown.
     pub(crate) depth: Option<u32>,
     /// The longest time between two messages, nanoseconds; `None` for any.
     pub(crate) deadline: Option<u64>,
@@ -154,7 +154,7 @@ mod tests {
     const LATCHED: Policies = Policies::new(true, true, Some(1));
 
     #[test]
-    fn a_reader_hears_who_offers_at_least_what_it_requests() {
+    fn a_reader_matches_writers_that_offer_at_least_what_it_requests() {
         for offered in [SENSOR, RELIABLE, LATCHED] {
             assert!(SENSOR.mismatches(&offered).is_empty());
         }

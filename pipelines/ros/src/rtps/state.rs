@@ -1,6 +1,6 @@
-//! What a participant knows: its endpoints, the other participants and theirs, and who matches whom.
+//! The state of a participant: its endpoints, the other participants and theirs, and which endpoints match.
 
-use super::super::own_name::is_of_gridweave;
+use super::super::discovery::node_identity::is_of_gridweave;
 use super::discovered::{EndpointData, ParticipantData};
 use super::guid::{EntityId, Guid, Prefix};
 use super::locator::reachable;

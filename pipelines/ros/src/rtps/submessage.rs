@@ -7,7 +7,7 @@ use super::number_set::NumberSet;
 /// The first bytes of a message: `RTPS`, and version 2.
 const MAGIC: &[u8] = b"RTPS\x02";
 
-/// A part of a message, with who has sent it and to whom.
+/// A part of a message, with its sender and its receiver.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Submessage<'a> {
     pub(crate) source: Prefix,

@@ -23,7 +23,7 @@ pub(crate) struct Writer {
     guid: Guid,
     /// The number of samples that it keeps; `None` for all.
     depth: Option<usize>,
-    /// Whether who comes later gets what it keeps.
+    /// Whether late joiners get the samples that it keeps.
     is_latched: bool,
     kept: BTreeMap<i64, Arc<Change>>,
     last: i64,

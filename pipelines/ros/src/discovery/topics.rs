@@ -1,31 +1,31 @@
 //! The topics that are offered to a source.
 
-use super::key_expression::Topic;
-use super::liveliness::{Entity, Kind};
-use super::middleware::Middleware;
-use super::qos::Qos;
+use crate::key_expression::Topic;
+use crate::liveliness::{Entity, Kind};
+use crate::middleware::Middleware;
+use crate::qos::Qos;
 use std::collections::BTreeSet;
 
 /// A topic on a middleware.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Offered {
+pub(crate) struct OfferedTopic {
     pub(crate) topic: Topic,
     pub(crate) middleware: Middleware,
 }
 
-/// A topic that was seen.
+/// A topic with publishers.
 #[derive(Debug)]
-pub(crate) struct Seen {
+pub(crate) struct SeenTopic {
     /// Its number in the router.
     pub(crate) number: usize,
-    /// What all that publish it offer.
+    /// The quality of service that all publishers offer.
     pub(crate) qos: Qos,
-    /// Those that publish it.
+    /// Its publishers.
     pub(crate) publishers: BTreeSet<Entity>,
 }
 
-impl Seen {
-    /// The quality of service that all that publish the topic offer.
+impl SeenTopic {
+    /// The quality of service that all publishers offer.
     pub(crate) fn offered_by_all(&self) -> Qos {
         let offers = self.publishers.iter().filter_map(|entity| match &entity.kind {
             Kind::Publisher(_, qos) => Some(*qos),

@@ -1,9 +1,9 @@
-//! What a node of Gridweave says of itself: its name, and an enclave by which the nodes of all runs know each other.
+//! The identity of a node of Gridweave: its name, and an enclave by which the nodes of all runs recognise each other.
 //!
-//! No run is to take what it publishes itself, or another one, for that of a robot. So these nodes are in the enclave
-//! `/gridweave/RUN`, on both middlewares. ROS needs enclaves for SROS alone, and takes any name for one.
+//! No run may take its own topics, or those of another run, for those of a robot. So these nodes are in the enclave
+//! `/gridweave/RUN`, on both middlewares. ROS needs enclaves for SROS alone, and accepts any name for one.
 
-use super::liveliness::Entity;
+use crate::liveliness::Entity;
 use gridweave_runtime::stage::Context;
 use std::fs;
 
@@ -12,14 +12,14 @@ const ENCLAVE: &str = "/gridweave/";
 /// Where the time at which a process was started is in its `stat`, after its name (proc(5)).
 const START_TIME: usize = 19;
 
-/// The name of a node.
+/// The name and the enclave of a node.
 #[derive(Clone, Debug)]
-pub(crate) struct OwnName {
+pub(crate) struct NodeIdentity {
     pub(crate) node: String,
     pub(crate) enclave: String,
 }
 
-impl OwnName {
+impl NodeIdentity {
     /// The name of the node of a stage, if none is given `gridweave_` and the name of the stage.
     pub(crate) fn of_stage(context: &Context, given: Option<&String>) -> Self {
         // The engine `processes` has the links, and starts the process of this stage.
@@ -39,13 +39,13 @@ impl OwnName {
         Self { node, enclave: format!("{ENCLAVE}run_{run}_{}", start_time(run).unwrap_or_default()) }
     }
 
-    /// The same node, which Gridweave takes for one of a robot.
+    /// The same node in the enclave of robots.
     #[must_use]
     pub(crate) fn into_robot(self) -> Self {
         Self { enclave: "/".to_owned(), ..self }
     }
 
-    /// Whose an entity is.
+    /// The owner of an entity.
     pub(crate) fn owner(&self, entity: &Entity) -> Owner {
         match is_of_gridweave(&entity.enclave) {
             true if entity.enclave == self.enclave => Owner::ThisRun,
@@ -60,7 +60,7 @@ pub(crate) fn is_of_gridweave(enclave: &str) -> bool {
     enclave.starts_with(ENCLAVE)
 }
 
-/// Whose an entity is.
+/// The owner of an entity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Owner {
     /// That of this run of Gridweave.
@@ -78,8 +78,8 @@ fn start_time(process: u32) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::liveliness::Kind;
     use super::*;
+    use crate::liveliness::Kind;
 
     fn entity(enclave: &str) -> Entity {
         Entity {
@@ -95,12 +95,12 @@ mod tests {
     }
 
     #[test]
-    fn nodes_of_one_run_know_each_other_and_those_of_other_runs() {
-        let [source, sink] = ["robots", "ros"].map(|name| OwnName::of_program(name, None));
+    fn nodes_of_one_run_recognise_each_other_and_those_of_other_runs() {
+        let [source, sink] = ["robots", "ros"].map(|name| NodeIdentity::of_program(name, None));
         assert_eq!((source.node.as_str(), source.enclave.split('_').count()), ("gridweave_robots", 3));
         assert!(!source.enclave.ends_with('_'), "{}", source.enclave);
         assert_eq!(source.owner(&entity(&sink.enclave)), Owner::ThisRun);
-        assert_eq!(source.owner(&entity(&OwnName::new("ros", None, 1).enclave)), Owner::OtherRun);
+        assert_eq!(source.owner(&entity(&NodeIdentity::new("ros", None, 1).enclave)), Owner::OtherRun);
         assert_eq!(source.owner(&entity(&sink.into_robot().enclave)), Owner::Other);
         assert_eq!(source.owner(&entity("")), Owner::Other);
     }

@@ -1,10 +1,10 @@
-//! What the doctor hears of the robots: how large their maps are, and in which frames, and where their tf trees begin.
+//! The subscriptions of the doctor: the sizes and frames of the robots' maps, and the roots of their tf trees.
 
-use super::census::{Published, Topics};
-use super::middleware::Middleware;
-use super::node::{Node, Subscriber};
-use super::own_name::Owner;
-use super::qos::Qos;
+use super::node_identity::Owner;
+use super::publishers::{Published, Topics};
+use crate::middleware::Middleware;
+use crate::node::{Node, Subscriber};
+use crate::qos::Qos;
 use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::ros::{OccupancyGrid, RosMessage, TFMessage, decode};
 use gridweave_runtime::stage::{RobotTopics, StageError, match_robot};
@@ -14,27 +14,32 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// The topics of transforms.
 const TF: [&str; 2] = ["tf", "tf_static"];
 
-/// What is heard.
+/// Subscriptions to maps and transforms, and what they received.
 #[derive(Default)]
-pub(crate) struct Hearing {
+pub(crate) struct DoctorSubscriptions {
     subscribers: BTreeMap<(String, Middleware), Subscriber>,
-    heard: Arc<Mutex<Heard>>,
+    received: Arc<Mutex<Received>>,
 }
 
 #[derive(Debug, Default)]
-struct Heard {
-    /// What there is to say of the map on each topic.
+struct Received {
+    /// The description of the map on each topic.
     maps: BTreeMap<String, String>,
     /// The frames that are parents, and those that are children, by the namespace of their topics.
     frames: BTreeMap<String, [BTreeSet<String>; 2]>,
 }
 
-impl Hearing {
+impl DoctorSubscriptions {
     /// Subscribes to the maps and transforms that are published.
     ///
     /// # Errors
     /// The session has failed.
-    pub(crate) fn hear(&mut self, node: &mut Node, topics: &Topics, robots: &RobotTopics) -> Result<(), StageError> {
+    pub(crate) fn subscribe(
+        &mut self,
+        node: &mut Node,
+        topics: &Topics,
+        robots: &RobotTopics,
+    ) -> Result<(), StageError> {
         for (name, of_topic) in topics {
             let is_map = match_robot(&robots.map, name).is_some();
             if !is_map && tf_namespace(name).is_none() {
@@ -53,8 +58,8 @@ impl Hearing {
                     is_latched: alike().all(|of| of.qos.is_latched),
                     depth: published.qos.depth,
                 };
-                let (to, topic) = (Arc::clone(&self.heard), name.clone());
-                let call = move |message: super::node::Received| lock(&to).note(&topic, is_map, &message.content());
+                let (to, topic) = (Arc::clone(&self.received), name.clone());
+                let call = move |message: crate::node::Received| lock(&to).note(&topic, is_map, &message.content());
                 let subscriber = node.subscribe(published.middleware, published.topic(name), qos, call)?;
                 self.subscribers.insert(key, subscriber);
             }
@@ -62,27 +67,27 @@ impl Hearing {
         Ok(())
     }
 
-    /// What has been heard on the topic of a map.
+    /// The description of the map on a topic.
     pub(crate) fn map(&self, topic: &str) -> String {
-        lock(&self.heard).maps.get(topic).cloned().unwrap_or_else(|| "which has not come yet".to_owned())
+        lock(&self.received).maps.get(topic).cloned().unwrap_or_else(|| "which has not come yet".to_owned())
     }
 
-    /// Where the tf tree of a robot begins, if it has one.
+    /// The roots of the tf tree of a robot, if it has one.
     pub(crate) fn tree(&self, robot: &str) -> String {
         let namespace = format!("/{robot}");
-        lock(&self.heard)
+        lock(&self.received)
             .roots(&namespace)
             .map(|roots| format!(", and tf on {namespace}/tf from {roots} on"))
             .unwrap_or_default()
     }
 
-    /// Where the frames on `/tf` begin.
+    /// The roots of the frames on `/tf`.
     pub(crate) fn shared_tree(&self) -> Option<String> {
-        lock(&self.heard).roots("").map(|roots| format!("frames on /tf begin with {roots}"))
+        lock(&self.received).roots("").map(|roots| format!("frames on /tf begin with {roots}"))
     }
 }
 
-impl Heard {
+impl Received {
     fn note(&mut self, topic: &str, is_map: bool, message: &[u8]) {
         if is_map {
             let text = match decode::<OccupancyGrid<'_>>(message) {
@@ -115,8 +120,8 @@ fn tf_namespace(topic: &str) -> Option<&str> {
     topic.rsplit_once('/').filter(|(_, name)| TF.contains(name)).map(|(namespace, _)| namespace)
 }
 
-fn lock(heard: &Mutex<Heard>) -> MutexGuard<'_, Heard> {
-    heard.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock(received: &Mutex<Received>) -> MutexGuard<'_, Received> {
+    received.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]
@@ -126,8 +131,8 @@ mod tests {
     use gridweave_runtime::ros::{Header, MapMetaData, TransformStamped, encode};
 
     #[test]
-    fn a_map_is_told_with_its_size_and_frame_and_a_tree_with_its_roots() {
-        let hearing = Hearing::default();
+    fn a_map_is_described_by_its_size_and_frame_and_a_tree_by_its_roots() {
+        let subscriptions = DoctorSubscriptions::default();
         let info = MapMetaData { width: 3, height: 1, resolution: 0.5, ..Default::default() };
         let map = OccupancyGrid { header: Header::new(LogTime(1), "map"), info, data: &[0; 3] };
         let transform = |parent: &str, child: &str| TransformStamped {
@@ -136,10 +141,10 @@ mod tests {
             ..Default::default()
         };
         let transforms = vec![transform("odom", "base_link"), transform("map", "odom")];
-        lock(&hearing.heard).note("/robot1/map", true, &encode(&map).unwrap());
-        lock(&hearing.heard).note("/robot1/tf", false, &encode(&TFMessage { transforms }).unwrap());
-        assert_eq!(hearing.map("/robot1/map"), "3 x 1 cells of 0.5 m in the frame `map`");
-        assert_eq!(hearing.tree("robot1"), ", and tf on /robot1/tf from `map` on");
-        assert!(hearing.map("/robot2/map").contains("not come") && hearing.shared_tree().is_none());
+        lock(&subscriptions.received).note("/robot1/map", true, &encode(&map).unwrap());
+        lock(&subscriptions.received).note("/robot1/tf", false, &encode(&TFMessage { transforms }).unwrap());
+        assert_eq!(subscriptions.map("/robot1/map"), "3 x 1 cells of 0.5 m in the frame `map`");
+        assert_eq!(subscriptions.tree("robot1"), ", and tf on /robot1/tf from `map` on");
+        assert!(subscriptions.map("/robot2/map").contains("not come") && subscriptions.shared_tree().is_none());
     }
 }

@@ -1,18 +1,18 @@
-//! What other nodes publish in a domain.
+//! The publishers of other nodes in a domain.
 
-use super::key_expression::Topic;
-use super::liveliness::{Entity, Kind};
-use super::middleware::Middleware;
-use super::own_name::Owner;
-use super::qos::Qos;
+use super::node_identity::Owner;
+use crate::key_expression::Topic;
+use crate::liveliness::{Entity, Kind};
+use crate::middleware::Middleware;
+use crate::qos::Qos;
 use std::collections::BTreeMap;
 
-/// The topics of every node, whatever it does.
+/// The topics that every node publishes.
 const OF_EVERY_NODE: [&str; 2] = ["/rosout", "/parameter_events"];
 
-/// The publishers of others, but for those that every node has.
+/// The publishers of other nodes, except those that every node has.
 #[derive(Debug, Default)]
-pub(crate) struct Census(BTreeMap<(Middleware, Entity), Owner>);
+pub(crate) struct DiscoveredPublishers(BTreeMap<(Middleware, Entity), Owner>);
 
 /// A published topic.
 #[derive(Clone, Debug)]
@@ -26,7 +26,7 @@ pub(crate) struct Published {
     pub(crate) nodes: Vec<String>,
 }
 
-/// What is published, by topic; several for one topic where types, QoS or middlewares differ.
+/// The published topics by name; several for one topic where types, QoS or middlewares differ.
 pub(crate) type Topics = BTreeMap<String, Vec<Published>>;
 
 impl Published {
@@ -36,8 +36,8 @@ impl Published {
     }
 }
 
-impl Census {
-    /// An entity is there, or is no more.
+impl DiscoveredPublishers {
+    /// Records that an entity has appeared, or has gone.
     pub(crate) fn note(&mut self, middleware: Middleware, entity: Entity, owner: Owner, is_there: bool) {
         let Kind::Publisher(topic, _) = &entity.kind else { return };
         if OF_EVERY_NODE.contains(&topic.name.as_str()) {
@@ -54,7 +54,7 @@ impl Census {
         self.0.values().all(|owner| *owner != Owner::Other)
     }
 
-    /// What is published.
+    /// The published topics.
     pub(crate) fn topics(&self) -> Topics {
         let mut topics = Topics::new();
         for ((middleware, entity), owner) in &self.0 {
@@ -101,22 +101,22 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn nodes_that_publish_alike_are_listed_together_and_what_every_node_publishes_is_left_out() {
-        let mut census = Census::default();
+    fn nodes_with_equal_publishers_are_listed_together_and_topics_of_every_node_are_left_out() {
+        let mut publishers = DiscoveredPublishers::default();
         let text = "std_msgs/msg/String";
         let rosout = publisher(["/", "a"], "/rosout", text, 1);
-        census.note(Middleware::Dds, rosout, Owner::Other, true);
+        publishers.note(Middleware::Dds, rosout, Owner::Other, true);
         let own = publisher(["/", "gridweave_ros"], "/a", text, 2);
-        census.note(Middleware::Dds, own, Owner::OtherRun, true);
-        assert!(census.has_no_robots());
+        publishers.note(Middleware::Dds, own, Owner::OtherRun, true);
+        assert!(publishers.has_no_robots());
         for (number, node) in [(3, "a"), (4, "b")] {
-            census.note(Middleware::Dds, publisher(["/", node], "/a", text, number), Owner::Other, true);
+            publishers.note(Middleware::Dds, publisher(["/", node], "/a", text, number), Owner::Other, true);
         }
-        census.note(Middleware::Zenoh, publisher(["/", "c"], "/a", text, 5), Owner::Other, true);
-        census.note(Middleware::Zenoh, publisher(["/", "c"], "/b", text, 6), Owner::Other, true);
-        census.note(Middleware::Zenoh, publisher(["/", "c"], "/b", text, 6), Owner::Other, false);
-        let topics = census.topics();
-        assert!(!census.has_no_robots() && topics.len() == 1, "{topics:?}");
+        publishers.note(Middleware::Zenoh, publisher(["/", "c"], "/a", text, 5), Owner::Other, true);
+        publishers.note(Middleware::Zenoh, publisher(["/", "c"], "/b", text, 6), Owner::Other, true);
+        publishers.note(Middleware::Zenoh, publisher(["/", "c"], "/b", text, 6), Owner::Other, false);
+        let topics = publishers.topics();
+        assert!(!publishers.has_no_robots() && topics.len() == 1, "{topics:?}");
         let nodes: Vec<Vec<String>> = topics["/a"].iter().map(|published| published.nodes.clone()).collect();
         assert_eq!(nodes, [vec!["/gridweave_ros"], vec!["/a", "/b"], vec!["/c"]]);
     }

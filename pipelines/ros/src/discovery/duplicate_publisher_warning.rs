@@ -1,9 +1,9 @@
-//! What to say where several programs publish what belongs to one robot.
+//! The warning when several programs publish one topic of a robot.
 
-use super::liveliness::Entity;
+use crate::liveliness::Entity;
 use gridweave_runtime::pipeline::list_in_words;
 
-/// What to warn of where these programs publish a topic of one robot.
+/// The warning for the publishers of a topic of one robot.
 pub(crate) fn warning(topic: &str, publishers: &[&Entity]) -> String {
     let named = |entity: &&Entity| match entity.node.is_empty() {
         true => format!("a program without a node, of the session {}", entity.session),
@@ -19,11 +19,11 @@ pub(crate) fn warning(topic: &str, publishers: &[&Entity]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::census::tests::publisher;
+    use super::super::publishers::tests::publisher;
     use super::*;
 
     #[test]
-    fn programs_are_named_by_their_nodes_and_one_that_has_crashed_is_thought_of() {
+    fn programs_are_named_by_their_nodes_and_a_crashed_one_is_considered() {
         let known = publisher(["/robot1", "slam"], "/robot1/map", "nav_msgs/msg/OccupancyGrid", 1);
         let nameless = Entity { node: String::new(), session: "0f".into(), ..known.clone() };
         let text = warning("/robot1/map", &[&known, &nameless]);

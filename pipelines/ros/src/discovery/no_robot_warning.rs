@@ -1,58 +1,58 @@
-//! What to say where no robot is heard.
+//! The warning when no robot is found.
 
-use super::advice::Findings;
-use super::census::Census;
-use super::liveliness::Entity;
-use super::middleware::Middleware;
-use super::node::Node;
-use super::own_name::Owner;
+use super::node_identity::Owner;
+use super::publishers::DiscoveredPublishers;
+use crate::advice::Findings;
+use crate::liveliness::Entity;
+use crate::middleware::Middleware;
+use crate::node::Node;
 use gridweave_runtime::stage::RobotTopics;
 use std::time::{Duration, Instant};
 
 /// The time that a router may take to answer before a warning.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// The interval between two looks at what others publish.
+/// The interval between two checks of the published topics.
 const LOOK_PERIOD: Duration = Duration::from_secs(1);
 
-/// Whether anybody is heard, and since when that has been so.
-pub(crate) struct Silence {
+/// Decides when to warn that no robot is found, and names the likely reasons.
+pub(crate) struct NoRobotWarning {
     /// The time without any publisher after which the likely reasons are named.
     discovery_timeout: Duration,
     is_connected: bool,
     since: Instant,
-    census: Census,
-    /// Since when a robot, or whoever it is, has published anything.
+    publishers: DiscoveredPublishers,
+    /// When the first node outside of Gridweave began to publish.
     published_since: Option<Instant>,
-    /// When it was looked last whether anything of it fits.
+    /// When the published topics were last checked.
     looked: Option<Instant>,
-    /// Whether something has fitted, or it was said what does not.
+    /// Whether a topic fits the pipeline, or the warning was given.
     is_settled: bool,
 }
 
-impl Silence {
+impl NoRobotWarning {
     pub(crate) fn new(discovery_timeout: Duration) -> Self {
         Self {
             discovery_timeout,
             is_connected: false,
             since: Instant::now(),
-            census: Census::default(),
+            publishers: DiscoveredPublishers::default(),
             published_since: None,
             looked: None,
             is_settled: false,
         }
     }
 
-    /// A publisher of another node is there, or is no more.
+    /// Records that a publisher of another node has appeared, or has gone.
     pub(crate) fn note(&mut self, middleware: Middleware, entity: Entity, owner: Owner, is_there: bool) {
-        self.census.note(middleware, entity, owner, is_there);
-        if !self.census.has_no_robots() {
+        self.publishers.note(middleware, entity, owner, is_there);
+        if !self.publishers.has_no_robots() {
             self.published_since.get_or_insert_with(Instant::now);
         }
     }
 
-    /// What to warn of where somebody publishes, and nothing that is a robot's, in a pipeline with these topics.
-    /// `hears_any` is whether it hears anything, and `draws_maps` whether it draws maps of scans.
+    /// The warning if nodes publish, but no topic of a robot of a pipeline with these topics. `hears_any` is whether the
+    /// pipeline receives any topic, and `draws_maps` whether it builds maps from scans.
     pub(crate) fn misfit(&mut self, robots: &RobotTopics, [hears_any, draws_maps]: [bool; 2]) -> Option<String> {
         let is_late = self.published_since.is_some_and(|since| since.elapsed() > self.discovery_timeout);
         let is_due = self.looked.is_none_or(|last| last.elapsed() > LOOK_PERIOD);
@@ -60,7 +60,7 @@ impl Silence {
             return None;
         }
         self.looked = Some(Instant::now());
-        let findings = Findings::new(&self.census.topics(), robots);
+        let findings = Findings::new(&self.publishers.topics(), robots);
         if !findings.maps.is_empty() || draws_maps && !findings.scanning.is_empty() {
             self.is_settled = true;
             return None;
@@ -69,14 +69,14 @@ impl Silence {
         self.is_settled = !advice.is_empty();
         match self.is_settled {
             true => Some(format!("no robot publishes a map on `{pattern}`: {}", advice.join("; "))),
-            false if hears_any || self.census.has_no_robots() || !findings.wrong_types.is_empty() => None,
+            false if hears_any || self.publishers.has_no_robots() || !findings.wrong_types.is_empty() => None,
             false => Some(format!(
                 "no robot publishes a map on `{pattern}`, nor anything else that is taken: `gridweave-ros doctor` lists what there is"
             )),
         }
     }
 
-    /// What to warn of as long as nobody publishes.
+    /// The warning if no node publishes.
     pub(crate) fn warning(&mut self, node: &Node) -> Option<String> {
         if self.published_since.is_some() {
             return None;
@@ -115,7 +115,7 @@ impl Silence {
     }
 }
 
-/// What the environment asks of programs of ROS on DDS and is not spoken here.
+/// Settings of ROS on DDS in the environment that are not supported here.
 fn not_spoken(variable: impl Fn(&str) -> String) -> String {
     let mut text = String::new();
     if !variable("ROS_DISCOVERY_SERVER").trim().is_empty() {
@@ -131,32 +131,32 @@ fn not_spoken(variable: impl Fn(&str) -> String) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::census::tests::publisher;
+    use super::super::publishers::tests::publisher;
     use super::*;
     use gridweave_runtime::ros::{OccupancyGrid, RosMessage};
 
     #[test]
-    fn somebody_who_publishes_nothing_that_fits_is_told_once() {
+    fn the_warning_of_publishers_without_a_fitting_topic_comes_once() {
         let map = |topic| publisher(["/robot1", "slam_toolbox"], topic, OccupancyGrid::NAME, 1);
-        let (mut silence, robots) = (Silence::new(Duration::ZERO), RobotTopics::default());
-        let told = |entity: Entity, silence: &mut Silence| {
-            silence.note(Middleware::Dds, entity, Owner::Other, true);
-            silence.looked = None;
-            silence.published_since = Instant::now().checked_sub(LOOK_PERIOD);
-            silence.misfit(&robots, [false, false])
+        let (mut no_robot, robots) = (NoRobotWarning::new(Duration::ZERO), RobotTopics::default());
+        let warning = |entity: Entity, no_robot: &mut NoRobotWarning| {
+            no_robot.note(Middleware::Dds, entity, Owner::Other, true);
+            no_robot.looked = None;
+            no_robot.published_since = Instant::now().checked_sub(LOOK_PERIOD);
+            no_robot.misfit(&robots, [false, false])
         };
-        let text = told(publisher(["/", "a"], "/a", "std_msgs/msg/String", 1), &mut silence);
+        let text = warning(publisher(["/", "a"], "/a", "std_msgs/msg/String", 1), &mut no_robot);
         assert!(text.unwrap().contains("gridweave-ros doctor"));
-        let text = told(map("/map"), &mut silence).unwrap();
+        let text = warning(map("/map"), &mut no_robot).unwrap();
         assert!(text.contains("-r /map:=map") && text.lines().count() == 1, "{text}");
-        assert_eq!(told(map("/b"), &mut silence), None);
-        let mut silence = Silence::new(Duration::ZERO);
-        assert_eq!(told(map("/robot1/map"), &mut silence), None);
-        assert!(silence.is_settled);
+        assert_eq!(warning(map("/b"), &mut no_robot), None);
+        let mut no_robot = NoRobotWarning::new(Duration::ZERO);
+        assert_eq!(warning(map("/robot1/map"), &mut no_robot), None);
+        assert!(no_robot.is_settled);
     }
 
     #[test]
-    fn what_keeps_robots_from_being_heard_is_named() {
+    fn settings_that_are_not_supported_are_named() {
         let with = |set: &'static str, value: &'static str| {
             not_spoken(|name| if name == set { value.to_owned() } else { String::new() })
         };
