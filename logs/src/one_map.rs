@@ -144,7 +144,7 @@ impl OneMap {
         format!("{sentence}: there is nothing to merge. Maps that they build themselves are read from `{pattern}`")
     }
 
-    /// What is said of robots of which a merge has something all the same; `None` if there are none.
+    /// The note about robots that a merge uses nevertheless; `None` if there are none.
     pub(crate) fn note(&self) -> Option<String> {
         (self.idle != self.robots).then(|| format!("{}, and have one frame without a merge", self.sentence()))
     }

@@ -143,7 +143,7 @@ impl<S: Subscriber> Layer<S> for WarningLayer {
 static ADVISED: Once = Once::new();
 
 /// What to do about a viewer that the server of the stage `foxglove_sink` has refused, if a warning is about one. The
-/// server does not tell the viewer why.
+/// server does not report the reason to the viewer.
 fn refused_viewer(module: &str, text: &str) -> Option<&'static str> {
     let is_refusal = module.starts_with("foxglove::") && text.ends_with(": handshake failed");
     is_refusal.then_some(
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn a_viewer_that_was_refused_is_told_which_protocol_it_needs() {
+    fn the_advice_on_a_refused_viewer_names_the_protocol() {
         let text = "Dropping client 127.0.0.1:4000: handshake failed";
         assert!(refused_viewer("foxglove::websocket::server", text).unwrap().contains("foxglove.sdk.v1"));
         assert_eq!(refused_viewer("foxglove::websocket::server", "Dropping client: too slow"), None);

@@ -1,22 +1,21 @@
-//! The ellipse that the covariance of a place stands for.
+//! The error ellipse of a 2 x 2 covariance.
 
 use nalgebra::Matrix2;
 
-/// An ellipse of equal probability about a place.
+/// An ellipse of equal probability about a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CovarianceEllipse {
-    /// The longer half axis and the shorter one, in the unit of the place.
+    /// The longer half axis and the shorter one, in the unit of the position.
     pub half_axes: [f64; 2],
     /// The direction of the longer one, radians, from -pi/2 to pi/2; 0 if both are as long.
     pub direction: f64,
 }
 
 impl CovarianceEllipse {
-    /// The ellipse of so many standard deviations. `None` if the covariance is not finite, or is too large to be
-    /// reckoned with.
+    /// The ellipse of a number of standard deviations. `None` if the covariance is not finite, or so large that the
+    /// ellipse is not.
     ///
-    /// The eigenvalues of a symmetric matrix of two rows have a closed form: nothing is to converge, whatever the
-    /// numbers.
+    /// Closed form, so it never fails to converge.
     pub fn new(covariance: &Matrix2<f64>, deviations: f64) -> Option<Self> {
         let (sum, difference) = (covariance.m11 + covariance.m22, covariance.m11 - covariance.m22);
         let mixed = covariance.m12 + covariance.m21;
@@ -48,7 +47,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_covariance_has_no_ellipse_or_a_flat_one() {
+    fn an_invalid_covariance_has_no_ellipse_or_a_flat_one() {
         for odd in [f64::NAN, f64::INFINITY, 1e308] {
             assert_eq!(CovarianceEllipse::new(&Matrix2::new(odd, 0.0, 0.0, odd), 1.0), None, "{odd}");
         }

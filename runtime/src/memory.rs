@@ -1,7 +1,7 @@
 //! The memory that this process may still take.
 //!
-//! Linux grants more memory than there is, and ends a process that uses it. So whoever is about to take much, at the
-//! word of a file, asks first.
+//! Linux grants more memory than there is, and ends a process that uses it. Code that allocates a size stated in a file
+//! checks this first.
 
 use rustix::process::{Resource, getrlimit};
 use std::fs;

@@ -102,7 +102,7 @@ fn messages_of_one_log_time_that_must_wait_take_limited_memory() {
 }
 
 #[test]
-fn a_source_that_is_silent_on_one_port_holds_nobody_up() {
+fn a_source_that_is_silent_on_one_port_delays_no_stage() {
     let mut builder = PipelineBuilder::new(registry());
     builder.stage("source", "counter", "count = 3000", &[]);
     builder.stage("late", "relay", "", &["source.b"]);

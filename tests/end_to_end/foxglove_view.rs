@@ -15,7 +15,7 @@ fn free_port() -> u16 {
 }
 
 #[test]
-fn a_port_that_is_taken_ends_the_run_and_is_told() {
+fn a_port_that_is_taken_ends_the_run_and_is_reported() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = taken.local_addr().unwrap().port();
     let folder = TempDir::new().unwrap();
@@ -27,7 +27,7 @@ fn a_port_that_is_taken_ends_the_run_and_is_told() {
 }
 
 #[test]
-fn a_port_that_the_system_chooses_is_told() {
+fn a_port_that_the_system_chooses_is_reported() {
     let run = Run::start(RECEIVE, &["--view=127.0.0.1:0"]);
     run.top();
     let done = run.interrupt();

@@ -194,7 +194,7 @@ fn a_stage_that_fails_at_start_is_tried_again_after_longer_and_longer_and_the_ru
 }
 
 #[test]
-fn a_link_with_more_topics_than_are_kept_for_who_comes_late_says_so() {
+fn a_link_with_more_topics_than_are_kept_for_late_joiners_is_reported() {
     let run = Run::start(RECEIVE, &[]);
     let mut log = LogBuilder::new(&run.path(LOG));
     for robot in 0..50 {

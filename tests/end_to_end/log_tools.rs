@@ -27,7 +27,7 @@ fn write(path: &Path, readings: u32, begin: f64) {
 }
 
 #[test]
-fn a_log_that_is_cut_is_recovered_and_what_is_lost_is_told() {
+fn a_cut_log_is_recovered_and_the_loss_is_reported() {
     let folder = TempDir::new().unwrap();
     let path = |name: &str| folder.path().join(name);
     write(&path("in.mcap"), 200, 0.0);
@@ -49,7 +49,7 @@ fn a_log_that_is_cut_is_recovered_and_what_is_lost_is_told() {
 }
 
 #[test]
-fn a_log_is_filtered_by_what_reading_can_be_told() {
+fn a_log_is_filtered_by_the_options_of_reading() {
     let folder = TempDir::new().unwrap();
     write(&folder.path().join("in.mcap"), 100, 0.0);
     let args = [
@@ -112,7 +112,7 @@ fn messages_are_printed_as_lines_of_json() {
 }
 
 #[test]
-fn clocks_that_have_nothing_in_common_are_told_and_laid_together() {
+fn unrelated_clocks_are_reported_and_aligned() {
     let folder = TempDir::new().unwrap();
     let path = |name: &str| folder.path().join(name);
     write(&path("a.mcap"), 20, 0.0);

@@ -242,7 +242,7 @@ fn without_a_run_the_commands_say_what_to_do() {
 }
 
 #[test]
-fn whoever_looks_on_at_a_replay_and_however_he_ends_its_result_is_the_same() {
+fn observers_of_a_replay_do_not_change_its_result() {
     let text = DIAMOND.replace("stall_timeout = 2.0\n", "");
     let gates: Vec<u64> = (1000..9000).step_by(10).collect();
     let settings = ["source.count=9000".to_owned(), format!("source.gates={gates:?}")];

@@ -165,7 +165,7 @@ fn robots_whose_odometry_drifts_are_merged() {
 
 /// The lidar of robot2 sees too little to find its way.
 #[test]
-fn a_robot_that_loses_its_way_is_not_merged_and_the_reason_is_said() {
+fn a_robot_that_loses_its_way_is_not_merged_and_the_reason_is_reported() {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
     for (robot, beams, range) in [("robot1", "beams=180", "lidar_range=12"), ("robot2", "beams=40", "lidar_range=0.8")]

@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn transforms_from_one_frame_of_all_maps_are_told_apart_by_their_children() {
+    fn transforms_from_one_frame_of_all_maps_are_distinguished_by_their_children() {
         let shared = shared(&[("a", "map"), ("b", "map")], &[("map", "a/base_link")]).unwrap();
         assert_edge(&shared, ("map", "a/base_link"), ("a/map", "a/base_link"));
         assert_edge(&shared, ("/map", "/b/odom"), ("b/map", "/b/odom"));

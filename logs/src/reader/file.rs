@@ -190,7 +190,7 @@ impl LogFile {
         &self.layout.compressions
     }
 
-    /// The log times of the first and the last message of a channel, or of the file where no index tells them; `None`
+    /// The log times of the first and the last message of a channel, or of the file where no index has them; `None`
     /// if there are no messages.
     pub(crate) fn span(&self, channel: u16) -> Option<(u64, u64)> {
         if let Some(index) = self.index() {

@@ -158,7 +158,7 @@ impl RobotChannels {
         };
         let topic = topic.escape_debug();
         let mismatch = format!("`{topic}` is not read as a robot's: the robot's name {why}; rename the topic");
-        // Of a topic that is too long, it is said where its messages are dropped.
+        // A topic that is too long is reported where its messages are dropped.
         Classified { role: Role::Other, robot: "", mismatch: (!name_fits).then_some(mismatch) }
     }
 

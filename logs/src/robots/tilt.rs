@@ -3,7 +3,7 @@
 use gridweave_runtime::ros::{Header, MapMetaData, Quaternion, decode};
 use serde::Deserialize;
 
-/// A map is said to be tilted from this angle on, degrees: a smaller one changes no cell by more than thousandths of
+/// A map is reported as tilted from this angle on, degrees: a smaller one changes no cell by more than thousandths of
 /// its place.
 const LEAST_TILT: f64 = 1.0;
 

@@ -124,7 +124,7 @@ fn no_such_place() -> io::Error {
 
 impl Drop for ChunkFile {
     fn drop(&mut self) {
-        // Errors are lost here; whoever needs them flushes first.
+        // Errors are lost here; code that needs them flushes first.
         let _ = self.flush();
     }
 }

@@ -342,7 +342,7 @@ impl ChannelRouter {
         }
         if output.map.is_read()
             && !routed(|role| role == Role::Map)
-            // Of scans that cannot be read, that is said.
+            // Scans that cannot be read have a warning of their own.
             && !self.routes.iter().any(|route| route.role == Role::Scan)
             && let Some(advice) = scan_rename_advice(self.topics_of(is_scan), &self.robots.scan)
         {

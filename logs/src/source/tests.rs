@@ -303,7 +303,7 @@ fn run_with_a_name_of(bytes: usize) -> Run {
 #[test]
 fn a_robot_whose_name_is_too_long_is_left_out_with_a_warning() {
     assert_eq!(run_with_a_name_of(64).times("map"), [1, 2]);
-    // What is dropped for its topic is not said to be of no robot, too.
+    // A message dropped for its topic is not also reported as one of no robot.
     for (bytes, named, dropped) in [(65, 2, 0), (120, 1, 1), (255, 0, 2), (60_000, 0, 2)] {
         let run = run_with_a_name_of(bytes);
         assert_eq!((run.times("map"), run.times("other").len()), (vec![2], 2 - dropped), "{bytes} bytes");

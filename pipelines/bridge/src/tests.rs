@@ -114,7 +114,7 @@ fn what_a_few_bytes_expand_to_is_limited_for_a_batch_and_for_all_senders() {
 }
 
 #[test]
-fn what_waits_beyond_its_room_is_dropped_and_told_at_both_ends() {
+fn messages_beyond_the_limit_are_dropped_and_reported_at_both_ends() {
     let (mut outbox, mut ingest) = (outbox(7, 3), Ingest::new(1, SECOND));
     for time in 0..9 {
         outbox.push(POSES, &header("/robot1/pose", time), &[time as u8]).unwrap();
@@ -233,7 +233,7 @@ fn a_clock_that_is_off_by_an_hour_is_seen_when_the_ends_meet() {
 }
 
 #[test]
-fn what_is_no_batch_is_told_and_changes_nothing() {
+fn invalid_batches_are_reported_and_change_nothing() {
     let (mut outbox, mut ingest) = (outbox(7, 3), Ingest::new(1, SECOND));
     outbox.push(MAPS, &header("/robot1/map", 1), &[1; 100]).unwrap();
     carry(&mut outbox, &mut ingest, 0);

@@ -22,7 +22,7 @@ pub(crate) fn keep_process() {
 }
 
 /// Whether this is a child of the process that has loaded the module, made by `fork` as `multiprocessing` does. It has
-/// none of the other's threads: whoever waits for one waits for ever.
+/// none of the other's threads: a wait for one never ends.
 pub(crate) fn is_forked() -> bool {
     LOADED_IN.get().is_some_and(|loaded_in| *loaded_in != process::id())
 }

@@ -29,7 +29,8 @@ impl Default for InitialPose {
 impl InitialPose {
     /// The origin of all initial poses, exactly.
     pub const ORIGIN: Self = Self { x: 0.0, y: 0.0, yaw: 0.0, stddev: 0.0, yaw_stddev: 0.0 };
-    /// The greatest yaw, radians: a full turn, with room for who rounds it. Who means degrees is told.
+    /// The greatest yaw, radians: a full turn, slightly enlarged for rounding; larger values are rejected as
+    /// degrees.
     pub const FULL_TURN: f64 = 1.00001 * std::f64::consts::TAU;
     /// Its keys in a pipeline file, and its order on a command line.
     pub const FIELDS: [&str; 5] = ["x", "y", "yaw", "stddev", "yaw_stddev"];

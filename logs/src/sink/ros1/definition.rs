@@ -146,7 +146,7 @@ fn is_built_in(name: &str) -> bool {
             | "duration"
             | "byte"
             | "char"
-            // ROS 1 has no such type: whoever encodes messages refuses it.
+            // ROS 1 has no such type: the encoder refuses it.
             | "wstring"
     )
 }

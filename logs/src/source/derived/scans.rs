@@ -18,8 +18,8 @@ pub(super) struct DerivedScans {
     unmounted: Option<BTreeMap<(String, String), LogTime>>,
 }
 
-/// How long a live source waits for the mount of a lidar, seconds of log time. Static transforms are sent to whoever
-/// joins, at once.
+/// How long a live source waits for the mount of a lidar, seconds of log time. Late joiners get static
+/// transforms at once.
 const MOUNT_TIMEOUT: f64 = 5.0;
 
 impl DerivedScans {

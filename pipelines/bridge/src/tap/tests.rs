@@ -96,7 +96,7 @@ fn refusal(answers: impl IntoIterator<Item = (u32, Answer)>) -> String {
 }
 
 #[test]
-fn who_taps_gets_each_message_once_and_an_answer_that_was_lost_once_more() {
+fn a_tap_gets_each_message_once_and_a_lost_answer_again() {
     let (mut sessions, link) = sessions(Limits::default());
     let now = Instant::now();
     assert_eq!(sessions.request(&request(0, 0), 1, now), None);
@@ -139,7 +139,7 @@ fn what_builds_upon_what_is_not_known_begins_anew() {
 }
 
 #[test]
-fn a_link_is_looked_on_at_no_longer_when_who_tapped_it_has_left_or_is_silent() {
+fn a_link_is_released_when_its_tap_has_left_or_is_silent() {
     let (mut sessions, link) = sessions(Limits::default());
     let now = Instant::now();
     sessions.request(&request(0, 0), 1, now);
@@ -174,7 +174,7 @@ fn what_waits_for_a_slow_program_is_bounded_and_what_is_dropped_counts_as_missed
 }
 
 #[test]
-fn the_links_are_told_and_others_refused() {
+fn the_links_are_listed_and_others_refused() {
     let (mut sessions, link) = sessions(Limits::default());
     let now = Instant::now();
     let (_, answer) = sessions.request(&Request::default(), 1, now).unwrap();
@@ -209,7 +209,7 @@ fn a_link_that_is_not_made_is_looked_for_now_and_then_and_given_up() {
 }
 
 #[test]
-fn a_link_that_cannot_be_read_any_more_is_told_and_closed() {
+fn an_unreadable_link_is_reported_and_closed() {
     let (mut sessions, link) = sessions(Limits::default());
     let now = Instant::now();
     sessions.request(&request(0, 0), 1, now);
@@ -220,7 +220,7 @@ fn a_link_that_cannot_be_read_any_more_is_told_and_closed() {
 }
 
 #[test]
-fn at_the_end_of_a_run_the_last_of_it_is_told() {
+fn at_the_end_of_a_run_its_last_messages_are_sent() {
     let (mut sessions, link) = sessions(Limits::default());
     let now = Instant::now();
     sessions.request(&request(0, 0), 1, now);

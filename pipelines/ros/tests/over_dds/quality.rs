@@ -5,7 +5,7 @@ use crate::domain::{Domain, give, map, sent, warned};
 use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage, encode};
 
 #[test]
-fn two_robots_of_one_name_are_told_with_the_names_of_their_nodes() {
+fn two_robots_of_one_name_are_reported_with_the_names_of_their_nodes() {
     let domain = Domain::new();
     let mut source = domain.source("");
     let mut robots = ["slam_a", "slam_b"].map(|node| domain.sink(node, &[(OccupancyGrid::NAME, "/robot1/map")]));
@@ -16,7 +16,7 @@ fn two_robots_of_one_name_are_told_with_the_names_of_their_nodes() {
 }
 
 #[test]
-fn a_topic_of_another_type_is_told_and_the_others_are_heard() {
+fn a_topic_of_another_type_is_reported_and_the_others_received() {
     let domain = Domain::new();
     let mut source = domain.source("");
     let mut robot = domain.sink("slam", &[(PoseStamped::NAME, "/robot1/map"), (OccupancyGrid::NAME, "/robot2/map")]);
@@ -58,7 +58,7 @@ fn what_gridweave_publishes_is_no_map_of_a_robot() {
 }
 
 #[test]
-fn a_second_run_that_publishes_the_same_is_told_by_name() {
+fn a_second_run_that_publishes_the_same_is_reported_by_name() {
     let domain = Domain::new();
     let wires = [(OccupancyGrid::NAME, "/map")];
     let mut other = domain.other_run("other", &wires);
@@ -81,7 +81,7 @@ fn a_second_run_that_publishes_the_same_is_told_by_name() {
 }
 
 #[test]
-fn maps_that_fit_no_robot_are_told_with_what_to_write() {
+fn maps_that_fit_no_robot_are_reported_with_advice() {
     let domain = Domain::new();
     let mut source = domain.source("discovery_timeout = 0.2");
     let mut robot = domain.sink("slam", &[(OccupancyGrid::NAME, "/map")]);
@@ -91,7 +91,7 @@ fn maps_that_fit_no_robot_are_told_with_what_to_write() {
 }
 
 #[test]
-fn a_domain_with_nobody_in_it_is_told() {
+fn an_empty_domain_is_reported() {
     let domain = Domain::new();
     let mut source = domain.source("discovery_timeout = 0.2");
     let text = warned(&mut source, "nobody publishes over DDS");
@@ -116,7 +116,7 @@ fn doctor(domain: &Domain, words: &str) -> String {
 }
 
 #[test]
-fn the_doctor_says_who_publishes_what_and_what_is_missing_for_a_merge() {
+fn the_doctor_lists_the_publishers_and_what_a_merge_lacks() {
     let domain = Domain::new();
     let mut first = domain.sink("slam_a", &[(OccupancyGrid::NAME, "/robot1/map")]);
     give(&mut first, 0, "/robot1/map", map(20, 1));

@@ -136,7 +136,7 @@ fn transforms_on_cyclone_dds_are_poses() {
 
 #[test]
 #[ignore = "needs a Python with rclpy, named by GRIDWEAVE_ROS_PYTHON"]
-fn who_asks_for_more_than_is_offered_is_told_with_both_settings() {
+fn a_request_for_more_than_is_offered_is_reported_with_both_settings() {
     let (folder, domain) = (TempDir::new().unwrap(), Domain::new());
     let mut sink = domain.sink("gridweave_ros", &[(PoseStamped::NAME, "/odd")]);
     let pose = || encode(&PoseStamped::default()).unwrap();
@@ -162,7 +162,7 @@ fn walls_up_to(count: usize) -> Vec<u8> {
 
 #[test]
 #[ignore = "needs a Python with rclpy, named by GRIDWEAVE_ROS_PYTHON"]
-fn who_hears_updates_has_the_map_by_them() {
+fn subscribers_get_the_map_by_updates() {
     let (folder, domain) = (TempDir::new().unwrap(), Domain::new());
     let mut sink = domain.sink("gridweave_ros", &[(OccupancyGrid::NAME, "/map")]);
     let mut viewer = start("cyclone_nodes.py", &domain, &["updates", "3", "300", "60"], folder.path());
@@ -301,7 +301,7 @@ fn go_on_sending(sink: &mut gridweave_runtime::stage::StageHarness, words: &str)
 
 #[test]
 #[ignore = "needs a Python with rclpy, named by GRIDWEAVE_ROS_PYTHON"]
-fn a_topic_that_is_no_map_is_told_and_the_rest_goes_on() {
+fn a_topic_without_maps_is_reported_and_the_others_received() {
     let (folder, domain) = (TempDir::new().unwrap(), Domain::new());
     let mut source = domain.source("");
     let _odd = rclpy(&domain, &["publish_strings", "/robot1/map"], folder.path());

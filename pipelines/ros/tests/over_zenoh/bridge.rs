@@ -108,7 +108,7 @@ fn messages_come_as_they_were_sent_on_the_port_that_they_are_for() {
 }
 
 #[test]
-fn an_end_is_said_and_who_goes_without_one_is_gone() {
+fn an_end_is_received_and_a_sender_without_one_is_gone() {
     let (endpoint, _) = free_endpoint();
     let mut source = source(&endpoint, "end_after = 1");
     let mut dies = sink(&endpoint, "sender = \"dies\"");
@@ -137,7 +137,7 @@ fn an_end_is_said_and_who_goes_without_one_is_gone() {
 }
 
 #[test]
-fn an_end_that_nobody_takes_is_told() {
+fn an_end_without_a_receiver_is_reported() {
     let (endpoint, _) = free_endpoint();
     let mut sink = sink(&endpoint, "linger = 0.1");
     give_pose(&mut sink, 1);
@@ -269,7 +269,7 @@ fn the_merged_map_of_a_base_is_the_map_of_a_robot_to_the_next() {
 }
 
 #[test]
-fn two_senders_of_one_name_and_a_base_that_is_not_there_are_told() {
+fn two_senders_of_one_name_and_a_missing_base_are_reported() {
     let (endpoint, _) = free_endpoint();
     let mut lonely = sink(&endpoint, "bridge = \"other\"");
     let mut source = source(&endpoint, "");
@@ -289,7 +289,7 @@ fn two_senders_of_one_name_and_a_base_that_is_not_there_are_told() {
 }
 
 #[test]
-fn what_is_open_to_others_must_be_told_to_be() {
+fn access_by_others_must_be_configured() {
     for (kind, parameters) in [
         (gridweave_bridge::source::kind(), "listen = [\"tcp/0.0.0.0:0\"]"),
         (gridweave_bridge::sink::kind(), "connect = [\"tcp/10.0.0.1:7448\"]"),

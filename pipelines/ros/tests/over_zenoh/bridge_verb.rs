@@ -244,7 +244,7 @@ fn a_run_that_is_carried_to_a_base_ends_in_the_same_map_as_where_it_was() {
 }
 
 #[test]
-fn a_base_that_is_killed_and_started_again_is_told_and_gets_what_follows() {
+fn a_restart_of_a_killed_base_is_reported_and_it_gets_later_messages() {
     let mut robot = Robot::start();
     let endpoint = free_endpoint();
     let (first_name, first) = log_base(&robot, BASE, &endpoint, "first.mcap");

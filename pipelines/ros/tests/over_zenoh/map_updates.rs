@@ -100,7 +100,7 @@ fn wait_until_seen(merge: &Merge, viewer: &mut Viewer) {
 }
 
 #[test]
-fn who_hears_updates_has_the_map_by_them_and_who_comes_late_has_it_at_once() {
+fn subscribers_get_the_map_by_updates_and_late_joiners_at_once() {
     let router = Router::start();
     let mut merge = Merge::start(&router, "");
     let mut viewer = Viewer::start(&router, "rviz", true, Qos::latched(1));
@@ -121,7 +121,7 @@ fn who_hears_updates_has_the_map_by_them_and_who_comes_late_has_it_at_once() {
 }
 
 #[test]
-fn where_somebody_hears_the_map_alone_all_maps_are_whole() {
+fn with_a_subscriber_without_updates_all_maps_are_whole() {
     let router = Router::start();
     let mut merge = Merge::start(&router, "");
     let mut viewer = Viewer::start(&router, "rviz", true, Qos::latched(1));

@@ -163,7 +163,7 @@ fn poses_come_from_their_topic_and_without_one_from_tf() {
 }
 
 #[test]
-fn what_cannot_be_taken_is_told_and_the_rest_goes_on() {
+fn unusable_topics_are_reported_and_the_others_received() {
     let router = Router::start();
     let robot = Robot::start(&router, "robot");
     let mut source = source(&router);
@@ -186,7 +186,7 @@ fn what_cannot_be_taken_is_told_and_the_rest_goes_on() {
 }
 
 #[test]
-fn two_robots_of_one_name_are_told_and_a_hash_that_ros_does_not_know_is_none() {
+fn two_robots_of_one_name_are_reported_and_a_hash_unknown_to_ros_is_none() {
     let router = Router::start();
     let mut source = source(&router);
     let mut unknown = topic("/robot1/map", OccupancyGrid::NAME);
@@ -212,7 +212,7 @@ fn a_source_without_a_router_says_so_and_goes_on() {
 }
 
 #[test]
-fn a_domain_in_which_nobody_publishes_is_named_with_the_likely_reasons() {
+fn a_domain_without_publishers_is_reported_with_the_likely_reasons() {
     let router = Router::start();
     let mut source = source_with(&router, "discovery_timeout = 0.1");
     let text = warned(&mut source, "nobody publishes");
@@ -224,7 +224,7 @@ fn a_domain_in_which_nobody_publishes_is_named_with_the_likely_reasons() {
 }
 
 #[test]
-fn the_merged_map_is_there_for_those_who_come_late_and_after_a_restart() {
+fn late_joiners_get_the_merged_map_also_after_a_restart() {
     let router = Router::start();
     let viewer = Robot::start(&router, "viewer");
     let topic = topic("/map", OccupancyGrid::NAME);
@@ -266,7 +266,7 @@ fn world_to(child: &str, x: f64) -> TransformStamped {
 }
 
 #[test]
-fn frames_are_told_together_and_do_not_jump() {
+fn frames_are_published_together_and_do_not_jump() {
     let router = Router::start();
     let mut sink = sink(&router.parameters(), &[(RobotFrames::NAME, "/robot_frames"), (TFMessage::NAME, "/tf_static")]);
     let viewer = Robot::start(&router, "viewer");
@@ -297,7 +297,7 @@ fn frames_are_told_together_and_do_not_jump() {
 }
 
 #[test]
-fn a_robot_with_a_tree_of_its_own_is_told_there_where_its_frame_lies() {
+fn the_frame_of_a_robot_with_its_own_tree_is_published_there() {
     let router = Router::start();
     let robot = Robot::start(&router, "slam_toolbox");
     let _tree = robot.publish(&topic("/robot2/tf", TFMessage::NAME), Qos::reliable(10));

@@ -128,7 +128,7 @@ inputs = ["robots.*"]
 "#;
 
 #[test]
-fn who_has_no_right_certificate_is_refused_and_both_ends_say_why() {
+fn a_peer_without_the_right_certificate_is_refused_and_both_ends_report_why() {
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
     let (fleet, others) = (Authority::new(folder, "fleet"), Authority::new(folder, "others"));

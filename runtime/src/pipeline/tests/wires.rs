@@ -76,7 +76,7 @@ fn limits_of_processes_may_be_switched_off() {
 }
 
 #[test]
-fn the_memory_of_messages_of_one_time_is_limited_unless_told_otherwise() {
+fn the_memory_of_messages_of_one_time_is_limited_by_default() {
     let limit = |text: &str| parse(&changed("seed = 7", text)).unwrap().same_time_limit;
     assert_eq!(limit("seed = 7"), 2 << 30);
     assert_eq!(limit("same_time_limit = 1000"), 1000);
