@@ -68,7 +68,7 @@ pub struct Hypothesis {
     /// Whether the stage that sent it has refused it.
     pub is_refused: bool,
     /// Whether it only competes with other hypotheses, and may not be accepted itself.
-    pub is_rival: bool,
+    pub is_alternative_only: bool,
 }
 
 impl Hypothesis {
@@ -83,7 +83,7 @@ impl Hypothesis {
             source: alignment.source.clone(),
             reason: alignment.reason.clone(),
             is_refused: !alignment.accepted,
-            is_rival: false,
+            is_alternative_only: false,
         })
     }
 }

@@ -64,7 +64,7 @@ impl<'a> PreparedPair<'a> {
             source: "maps".to_owned(),
             reason: refusal.as_ref().map_or(reason, ToString::to_string),
             is_refused: refusal.is_some(),
-            is_rival: false,
+            is_alternative_only: false,
         }
     }
 }

@@ -62,7 +62,7 @@ impl Candidate {
     /// Merges a candidate at the same pose into this one. It is represented by what was proposed and not refused, of
     /// two such by the first.
     pub(super) fn unite(&mut self, mut other: Self) {
-        let rank = |candidate: &Self| (candidate.hypothesis.is_refused, candidate.hypothesis.is_rival);
+        let rank = |candidate: &Self| (candidate.hypothesis.is_refused, candidate.hypothesis.is_alternative_only);
         if rank(&other) < rank(self) {
             std::mem::swap(self, &mut other);
         }

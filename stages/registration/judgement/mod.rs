@@ -11,6 +11,7 @@
 
 mod candidate;
 mod comparisons;
+mod competition;
 mod judge;
 mod parameters;
 mod priors;
@@ -25,7 +26,8 @@ mod tests;
 
 pub use candidate::Candidate;
 pub use comparisons::Comparisons;
-pub use judge::{UserKnowledge, candidates, judge, judge_again, posterior};
+pub use competition::posterior;
+pub use judge::{UserKnowledge, candidates, judge, judge_again};
 pub use parameters::JudgementParameters;
 pub use refusal::{Listed, Refusal};
 pub use self_similarity::{Alias, SelfSimilarity};

@@ -102,18 +102,18 @@ pub enum Refusal {
     },
     /// Tags and maps propose different poses.
     #[error(
-        "the evidence contradicts itself: the {source_of_rival} propose a pose {shift:.1} m and {turn:.0} degrees away, where \
-         {rival:.0} m of wall agree, against {here:.0} m here"
+        "the evidence contradicts itself: the {other_source} propose a pose {shift:.1} m and {turn:.0} degrees away, where \
+         {there:.0} m of wall agree, against {here:.0} m here"
     )]
     SourcesDisagree {
         /// Source of the other pose.
-        source_of_rival: String,
+        other_source: String,
         /// Distance of the other pose, metres.
         shift: f64,
         /// Rotation of map b to the other pose, degrees.
         turn: f64,
         /// Inlier length at the other pose, metres.
-        rival: f64,
+        there: f64,
         /// Inlier length at this pose, metres.
         here: f64,
     },
@@ -184,8 +184,8 @@ impl Refusal {
             Self::OutsideWindow { shift, turn } => {
                 format!("the maps fit {shift:.1} m and {turn:.0} degrees from the initial poses only")
             }
-            Self::SourcesDisagree { source_of_rival, shift, .. } => {
-                format!("the {source_of_rival} propose a pose {shift:.1} m away, where the maps fit better")
+            Self::SourcesDisagree { other_source, shift, .. } => {
+                format!("the {other_source} propose a pose {shift:.1} m away, where the maps fit better")
             }
             Self::NoSuchHypothesis { asked, count } => {
                 format!("hypothesis {asked} was chosen, but there are only {count}")

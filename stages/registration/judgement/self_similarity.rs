@@ -214,7 +214,7 @@ mod tests {
             source: "maps".to_owned(),
             reason: String::new(),
             is_refused: false,
-            is_rival: false,
+            is_alternative_only: false,
         };
         let parameters = JudgementParameters::default();
         let (a, b) = (a.view(), b.view());

@@ -27,7 +27,7 @@ fn by_tags(transform_a_b: &Pose2) -> Hypothesis {
         source: "tags".into(),
         reason: "four tags".into(),
         is_refused: false,
-        is_rival: false,
+        is_alternative_only: false,
     }
 }
 
@@ -79,7 +79,7 @@ fn right_hypotheses_are_accepted_from_tags_and_from_maps() {
     let maps = by_maps(&[truth, elsewhere]);
     let verdict = judged(&a, &b, &maps);
     assert_eq!((verdict.refusal.clone(), verdict.candidate.number), (None, 0), "{}", reason(&verdict));
-    assert!(verdict.rival.as_ref().is_some_and(|rival| (rival.shift - 1.5).abs() < 0.05));
+    assert!(verdict.second_best.as_ref().is_some_and(|second| (second.shift - 1.5).abs() < 0.05));
     assert!(verdict.probability > 0.98);
     let maps = by_maps(&[elsewhere, truth]);
     let verdict = judged(&a, &b, &maps);
@@ -277,7 +277,8 @@ fn the_wrong_quarter_is_refused() {
     let b = office.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(10.0, 6.0, 0.3));
     for turn in [FRAC_PI_2, PI, -FRAC_PI_2] {
         // The peaks of a search compete with the tags.
-        let found = by_maps(&[a.transform_to(&b)]).into_iter().map(|one| Hypothesis { is_rival: true, ..one });
+        let found =
+            by_maps(&[a.transform_to(&b)]).into_iter().map(|one| Hypothesis { is_alternative_only: true, ..one });
         let wrong = by_tags(&(pose(0.0, 0.0, turn) * a.transform_to(&b)));
         let hypotheses: Vec<Hypothesis> = std::iter::once(wrong).chain(found).collect();
         let verdict = judged(&a, &b, &hypotheses);

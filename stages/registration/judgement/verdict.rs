@@ -12,7 +12,7 @@ const RESOLUTION_ERROR: f64 = 0.02;
 
 /// The second most probable candidate.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rival {
+pub struct SecondBest {
     /// Shift of the centroid of the inliers to it, metres.
     pub shift: f64,
     /// Rotation of map b to it, radians.
@@ -27,7 +27,7 @@ pub struct Rival {
     pub is_by_tags: bool,
 }
 
-impl Rival {
+impl SecondBest {
     /// Describes one candidate relative to the best.
     pub(super) fn new(best: &Candidate, other: &Candidate, probability: f64) -> Self {
         let (shift, turn) = best.change(&other.transform_a_b());
@@ -50,7 +50,7 @@ pub struct Verdict {
     /// Why it is refused; none if it is accepted.
     pub refusal: Option<Refusal>,
     /// The second most probable candidate, if there is one.
-    pub rival: Option<Rival>,
+    pub second_best: Option<SecondBest>,
     /// Probability that the candidate is right, 0 to 1.
     pub probability: f64,
     /// Prior log-odds of the candidate, from tags and from initial poses.
@@ -67,7 +67,7 @@ impl Verdict {
         Self {
             candidate,
             refusal: None,
-            rival: None,
+            second_best: None,
             probability: 0.0,
             prior: 0.0,
             chosen: None,
@@ -154,7 +154,7 @@ impl Verdict {
             return Ok(());
         }
         write!(text, "; the maps confirm it")?;
-        if let Some(Rival { agreement, .. }) = &self.rival {
+        if let Some(SecondBest { agreement, .. }) = &self.second_best {
             let share = 100.0 * agreement.inlier_ratio();
             write!(text, "; at the second-best pose {share:.0} % of {:.0} m agree", agreement.compared_length())?;
         }
@@ -210,7 +210,7 @@ impl Verdict {
             write!(text, "\n  {:<36} {contribution:>7.1}   ({value:.2})", term.name())?;
         }
         write!(text, "\n  {:<36} {:>7.1}", "sum", terms.log_odds() + self.prior)?;
-        if let Some(Rival { probability, .. }) = &self.rival {
+        if let Some(SecondBest { probability, .. }) = &self.second_best {
             write!(text, "\n  probability {:.6}, of the second-best hypothesis {probability:.6}", self.probability)?;
         }
         Ok(())

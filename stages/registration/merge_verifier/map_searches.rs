@@ -46,7 +46,8 @@ impl MapSearches {
             let prepared = PreparedPair::new(a.1, b.1, &search);
             // Maps that fit nowhere have no alternative.
             let found = prepared.and_then(|prepared| prepared.hypotheses(known, &search, &icp)).unwrap_or_default();
-            let found = found.into_iter().map(|hypothesis| Hypothesis { is_rival: true, ..hypothesis }).collect();
+            let found =
+                found.into_iter().map(|hypothesis| Hypothesis { is_alternative_only: true, ..hypothesis }).collect();
             self.0.insert(pair.clone(), Searched { maps, found });
         }
         self.0.get(pair).map_or(&[], |searched| &searched.found)

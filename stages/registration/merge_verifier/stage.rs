@@ -274,7 +274,7 @@ fn view(map: &RobotMap<WallsOnDemand>) -> MapView<'_> {
 /// Evidence of a verdict on a pair, with the number of hypotheses, without a header.
 fn evidence(verdict: &Verdict, pair: &RobotPair, hypotheses: usize) -> Evidence {
     let Agreement { overlap, inlier_length, conflict_length, evidence, .. } = verdict.candidate.agreement;
-    let elsewhere = verdict.rival.as_ref().map_or(0.0, |rival| rival.agreement.evidence.max(0.0));
+    let elsewhere = verdict.second_best.as_ref().map_or(0.0, |second| second.agreement.evidence.max(0.0));
     Evidence {
         header: Header::default(),
         a: pair.a.clone(),
