@@ -45,7 +45,7 @@ impl Scale {
         let step = rasters.step();
         let most = ((1.0 + range).ln() / step).floor() as i32;
         let factors: Vec<f64> = (-most..=most).map(|number| (f64::from(number) * step).exp()).collect();
-        Self::near(a, b, range, (&rasters, &factors), parameters)
+        Self::near(a, b, range, &rasters, &factors, parameters)
             .or_else(|| Self::doubled(a, b, factors.len() + DOUBLINGS.len(), parameters))
     }
 
@@ -54,7 +54,8 @@ impl Scale {
         a: Grid<'_>,
         b: Grid<'_>,
         range: f64,
-        (rasters, factors): (&Rasters<'_>, &[f64]),
+        rasters: &Rasters<'_>,
+        factors: &[f64],
         parameters: &RegistrationParameters,
     ) -> Option<Self> {
         let significances: Vec<f64> = factors.par_iter().map(|factor| rasters.significance(*factor)).collect();

@@ -1,10 +1,10 @@
 //! A search of the maps, for pairs whose hypotheses come from a source that has not looked for alternatives.
 
+use super::numbered_map::NumberedMap;
 use crate::registration::icp::IcpParameters;
 use crate::registration::judgement::{UserKnowledge, Verdict};
 use crate::registration::search::MapAlignerParameters;
 use crate::registration::{Basis, Hypothesis, PreparedPair};
-use crate::shared::geometry::Grid;
 use crate::shared::robot_pair::RobotPair;
 use std::collections::BTreeMap;
 
@@ -33,17 +33,17 @@ impl MapSearches {
         usable().next().is_some() && !usable().any(is_by_search) && !is_clear && verdict.chosen.is_none()
     }
 
-    /// Peaks of the search of two maps, each with its number among those of its robot.
+    /// Peaks of the search of two maps.
     pub(super) fn of(
         &mut self,
         pair: &RobotPair,
-        (a, b): ((u64, Grid<'_>), (u64, Grid<'_>)),
+        [a, b]: &[NumberedMap<'_>; 2],
         known: &UserKnowledge,
     ) -> &[Hypothesis] {
-        let maps = (a.0, b.0);
+        let maps = (a.number, b.number);
         if self.0.get(pair).is_none_or(|searched| searched.maps != maps) {
             let (search, icp) = (MapAlignerParameters::default(), IcpParameters::default());
-            let prepared = PreparedPair::new(a.1, b.1, &search);
+            let prepared = PreparedPair::new(a.view.grid, b.view.grid, &search);
             // Maps that fit nowhere have no alternative.
             let found = prepared.and_then(|prepared| prepared.hypotheses(known, &search, &icp)).unwrap_or_default();
             let found =

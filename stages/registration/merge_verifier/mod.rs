@@ -3,6 +3,8 @@
 
 mod knowledge;
 mod map_searches;
+mod messages;
+mod numbered_map;
 mod self_similarities;
 mod stage;
 

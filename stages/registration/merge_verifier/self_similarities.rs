@@ -1,6 +1,7 @@
 //! Cache of the self-similarity of the robots' maps, so that not every map is searched.
 
-use crate::registration::comparison::{Agreement, MapView};
+use super::numbered_map::NumberedMap;
+use crate::registration::comparison::Agreement;
 use crate::registration::judgement::{Alias, JudgementParameters, SelfSimilarity, Verdict};
 use crate::registration::pose_window::PoseWindow;
 use crate::shared::geometry::{Pose2, is_known};
@@ -38,13 +39,12 @@ struct Searched {
 }
 
 impl SelfSimilarities {
-    /// The most probable alias of a pose that was accepted by the maps only; searches the maps if necessary. Each map
-    /// is given with its number among those of its robot.
+    /// The most probable alias of a pose that was accepted by the maps only; searches the maps if necessary.
     pub(super) fn alias(
         &mut self,
         verdict: &Verdict,
         pair: &RobotPair,
-        (a, b): ((u64, &MapView<'_>), (u64, &MapView<'_>)),
+        [a, b]: &[NumberedMap<'_>; 2],
         window: Option<&PoseWindow>,
         parameters: &JudgementParameters,
     ) -> Option<Alias> {
@@ -53,7 +53,7 @@ impl SelfSimilarities {
         let (of_a, of_b) = (self.searched.get(&pair.a)?, self.searched.get(&pair.b)?);
         let candidate = &verdict.candidate;
         let asked = Asked {
-            maps: [a.0, b.0, of_a.number, of_b.number],
+            maps: [a.number, b.number, of_a.number, of_b.number],
             transform_a_b: candidate.transform_a_b(),
             agreement: candidate.agreement,
             window: window.copied(),
@@ -61,20 +61,20 @@ impl SelfSimilarities {
         if let Some((_, alias)) = self.aliases.get(pair).filter(|(known, _)| *known == asked) {
             return alias.clone();
         }
-        let alias = Alias::likeliest(verdict, (a.1, &of_a.found), (b.1, &of_b.found), window, parameters);
+        let alias = Alias::likeliest(verdict, (&a.view, &of_a.found), (&b.view, &of_b.found), window, parameters);
         self.aliases.insert(pair.clone(), (asked, alias.clone()));
         alias
     }
 
     /// Searches a map of a robot, unless an earlier result is still valid.
-    fn search(&mut self, robot: &str, (number, map): (u64, &MapView<'_>), parameters: &JudgementParameters) {
-        let known_cells = map.grid.cells.iter().filter(|value| is_known(**value)).count();
+    fn search(&mut self, robot: &str, map: &NumberedMap<'_>, parameters: &JudgementParameters) {
+        let known_cells = map.view.grid.cells.iter().filter(|value| is_known(**value)).count();
         let holds = |searched: &Searched| {
             searched.known_cells.abs_diff(known_cells) as f64 <= LITTLE_CHANGE * searched.known_cells as f64
         };
         if !self.searched.get(robot).is_some_and(holds) {
-            let found = SelfSimilarity::new(map, parameters);
-            self.searched.insert(robot.to_owned(), Searched { number, known_cells, found });
+            let found = SelfSimilarity::new(&map.view, parameters);
+            self.searched.insert(robot.to_owned(), Searched { number: map.number, known_cells, found });
         }
     }
 
@@ -102,7 +102,7 @@ mod tests {
         for (number, map, searched) in
             [(0, up_to(10.0), 0), (1, up_to(11.0), 0), (2, up_to(14.0), 2), (3, up_to(15.0), 2)]
         {
-            kept.search("robot1", (number, &map.view()), &parameters);
+            kept.search("robot1", &NumberedMap { number, view: map.view() }, &parameters);
             assert_eq!(kept.searched["robot1"].number, searched, "map {number}");
         }
         assert_eq!(kept.forget_former(|_| Some(2)), Vec::<String>::new());

@@ -2,19 +2,18 @@
 
 use super::knowledge::{Knowledge, by_initial_poses};
 use super::map_searches::MapSearches;
+use super::messages::{evidence, judged, refused, scale_reason};
+use super::numbered_map::NumberedMap;
 use super::self_similarities::SelfSimilarities;
-use crate::registration::comparison::{Agreement, Deformed, MapView};
 use crate::registration::hypotheses::{HypothesisGatherer, Origin};
 use crate::registration::judgement::{Comparisons, JudgementParameters, UserKnowledge, Verdict, judge_again};
 use crate::registration::scale::{LEAST_PROBABILITY, Scale};
 use crate::registration::{Hypothesis, RegistrationParameters};
-use crate::shared::geometry::row_by_row;
-use crate::shared::robot_maps::{RobotMap, RobotMaps};
+use crate::shared::robot_maps::RobotMaps;
 use crate::shared::robot_pair::RobotPair;
-use crate::shared::walls::{NORMAL_RADIUS, WallsOnDemand};
+use crate::shared::walls::WallsOnDemand;
 use gridweave_runtime::ros::{Alignment, Evidence, Header, OccupancyGrid};
 use gridweave_runtime::stage::{Context, Out, Output, OutputPorts, Outputs, Received, StageError};
-use nalgebra::Matrix3;
 use std::collections::BTreeMap;
 
 /// The scale is searched if no more pairs are to be.
@@ -169,7 +168,7 @@ impl MergeVerifier {
         self.hypotheses.keys()
     }
 
-    /// Judges a pair, and sends the verdict and the evidence if they have changed.
+    /// Judges a pair, and publishes the verdict. A pair that waits for a map is judged once that has come.
     fn update(&mut self, pair: &RobotPair, output: &Output<Judgements>) -> Result<(), StageError> {
         let known = self.knowledge.of(pair, self.maps.iter().count());
         let proposed = proposed(&self.hypotheses, pair);
@@ -180,44 +179,52 @@ impl MergeVerifier {
         if maps.is_none() && proposed.iter().any(|alignment| alignment.accepted) {
             return Ok(());
         }
-        let verdict = maps.and_then(|(a, b)| {
-            let mut hypotheses: Vec<Hypothesis> = proposed.iter().filter_map(|one| Hypothesis::of(one)).collect();
-            let (view_a, view_b) = (view(a), view(b));
-            let (numbers, comparisons) = self.comparisons.entry(pair.clone()).or_default();
-            if *numbers != (a.number, b.number) {
-                (*numbers, *comparisons) = ((a.number, b.number), Comparisons::default());
-            }
-            let mut judge = |hypotheses: &[Hypothesis]| {
-                judge_again(&view_a, &view_b, hypotheses, &known, &self.parameters, comparisons)
-            };
-            let mut verdict = judge(&hypotheses)?;
-            if MapSearches::is_due(&hypotheses, &verdict) {
-                let grids = ((a.number, a.grid()), (b.number, b.grid()));
-                hypotheses.extend_from_slice(self.map_searches.of(pair, grids, &known));
-                verdict = judge(&hypotheses)?;
-            }
-            if !verdict.rests_on_maps_alone() {
-                return Some(verdict);
-            }
-            let maps = ((a.number, &view_a), (b.number, &view_b));
-            let alias = self.self_similarities.alias(&verdict, pair, maps, known.window.as_ref(), &self.parameters);
-            Some(verdict.against(alias.as_ref(), &self.parameters))
-        });
-        let judged_of: Vec<&Alignment> = proposed.iter().copied().filter(|one| Hypothesis::of(one).is_some()).collect();
+        let verdict = self.judge_pair(pair, &known);
+        self.publish(pair, verdict.as_ref(), output)
+    }
+
+    /// Judges the hypotheses of a pair, with those of a search if that is due, and against self-similarity of the maps
+    /// if nothing but the maps confirms them. `None` without both maps, or without hypotheses.
+    fn judge_pair(&mut self, pair: &RobotPair, known: &UserKnowledge) -> Option<Verdict> {
+        let (a, b) = self.maps.pair(pair)?;
+        let maps = [NumberedMap::of(a), NumberedMap::of(b)];
+        let proposed = proposed(&self.hypotheses, pair);
+        let mut hypotheses: Vec<Hypothesis> = proposed.into_iter().filter_map(Hypothesis::of).collect();
+        let (numbers, comparisons) = self.comparisons.entry(pair.clone()).or_default();
+        if *numbers != (a.number, b.number) {
+            (*numbers, *comparisons) = ((a.number, b.number), Comparisons::default());
+        }
+        let [view_a, view_b] = maps.each_ref().map(|map| &map.view);
+        let mut judge =
+            |hypotheses: &[Hypothesis]| judge_again(view_a, view_b, hypotheses, known, &self.parameters, comparisons);
+        let mut verdict = judge(&hypotheses)?;
+        if MapSearches::is_due(&hypotheses, &verdict) {
+            hypotheses.extend_from_slice(self.map_searches.of(pair, &maps, known));
+            verdict = judge(&hypotheses)?;
+        }
+        if !verdict.rests_on_maps_alone() {
+            return Some(verdict);
+        }
+        let alias = self.self_similarities.alias(&verdict, pair, &maps, known.window.as_ref(), &self.parameters);
+        Some(verdict.against(alias.as_ref(), &self.parameters))
+    }
+
+    /// Sends the verdict on a pair and its evidence if they have changed; without a verdict a refusal.
+    fn publish(
+        &mut self,
+        pair: &RobotPair,
+        verdict: Option<&Verdict>,
+        output: &Output<Judgements>,
+    ) -> Result<(), StageError> {
         self.other_scales.remove(pair);
-        let Some(verdict) = &verdict else { return self.send(pair, refused(&proposed), output) };
+        let proposed = proposed(&self.hypotheses, pair);
+        let Some(verdict) = verdict else { return self.send(pair, refused(&proposed), output) };
         if let (Some(scale), None) = (verdict.other_scale(), &verdict.refusal) {
             self.other_scales.insert(pair.clone(), scale);
         }
-        let (evidence, alignment) = (
-            evidence(verdict, pair, proposed.len()),
-            judged(
-                verdict,
-                &judged_of,
-                &proposed,
-                verdict.reason(self.parameters.accept, &self.name, &pair.a, &pair.b),
-            ),
-        );
+        let evidence = evidence(verdict, pair, proposed.len());
+        let reason = verdict.reason(self.parameters.accept, &self.name, &pair.a, &pair.b);
+        let alignment = judged(verdict, &proposed, reason);
         if self.evidence.get(pair) != Some(&evidence) {
             let header = Header::new(output.log_time(), alignment.header.frame_id.clone());
             output.evidence.send("", &Evidence { header, ..evidence.clone() })?;
@@ -245,90 +252,10 @@ impl MergeVerifier {
     }
 }
 
-/// First paragraph of the reason for a pair whose maps agree at another scale, where the cells of map b are `cell`
-/// metres wide by its resolution.
-fn scale_reason(scale: &Scale, pair: &RobotPair, cell: f64) -> String {
-    let Scale { factor, verdict } = scale;
-    let RobotPair { a, b } = pair;
-    let Agreement { inlier_length, conflict_length, .. } = verdict.candidate.agreement;
-    format!(
-        "the maps may fit if {b} is {factor:.3} times as large: {inlier_length:.0} m of wall agree, {conflict_length:.0} m do not\n\
-         missing: the right resolution of {b}, or of {a}\n\
-         try: cells of {side:.5} m instead of {cell:.5} m, if {a} is right; for map files --resolution {b}={side:.5}\n\n",
-        side = factor * cell,
-    )
-}
-
 /// All hypotheses of a pair, by source and rank.
 fn proposed<'a>(
     hypotheses: &'a BTreeMap<RobotPair, BTreeMap<String, Vec<Alignment>>>,
     pair: &RobotPair,
 ) -> Vec<&'a Alignment> {
     hypotheses.get(pair).into_iter().flat_map(BTreeMap::values).flatten().collect()
-}
-
-fn view(map: &RobotMap<WallsOnDemand>) -> MapView<'_> {
-    MapView::rigid(map.grid(), map.walls(NORMAL_RADIUS))
-}
-
-/// Evidence of a verdict on a pair, with the number of hypotheses, without a header.
-fn evidence(verdict: &Verdict, pair: &RobotPair, hypotheses: usize) -> Evidence {
-    let Agreement { overlap, inlier_length, conflict_length, evidence, .. } = verdict.candidate.agreement;
-    let elsewhere = verdict.second_best.as_ref().map_or(0.0, |second| second.agreement.evidence.max(0.0));
-    Evidence {
-        header: Header::default(),
-        a: pair.a.clone(),
-        b: pair.b.clone(),
-        hypotheses: hypotheses as u32,
-        overlap,
-        wall_on_wall: inlier_length,
-        wall_on_free: conflict_length,
-        evidence_elsewhere: (elsewhere / evidence.max(1.0)).min(2.0),
-    }
-}
-
-/// Verdict for a pair with a pose: `judged_of` are the alignments that were judged, in the order of the hypotheses.
-fn judged(verdict: &Verdict, judged_of: &[&Alignment], proposed: &[&Alignment], reason: String) -> Alignment {
-    let accepted = verdict.refusal.is_none();
-    let source = &verdict.candidate.hypothesis.source;
-    let mut alignment = judged_of.get(verdict.candidate.number).map_or_else(Alignment::default, |one| (*one).clone());
-    if let Some(Deformed { transform_a_b, .. }) = &verdict.candidate.deformed {
-        alignment.set_transform_a_b(transform_a_b);
-    }
-    if let Some(covariance) = &verdict.candidate.left_by_deformation {
-        alignment.covariance = row_by_row(&(Matrix3::from_row_slice(&alignment.covariance) + covariance));
-    }
-    Alignment {
-        accepted,
-        provisional: false,
-        rank: 0,
-        hypotheses: 0,
-        score: verdict.probability,
-        reason: if accepted { reason } else { with_other_sources(reason, source, proposed) },
-        ..alignment
-    }
-}
-
-/// Verdict for a pair without a pose.
-fn refused(proposed: &[&Alignment]) -> Alignment {
-    let Some(first) = proposed.first() else { return Alignment::default() };
-    let reason = with_other_sources(first.reason.clone(), &first.source, proposed);
-    Alignment { accepted: false, provisional: false, rank: 0, hypotheses: 0, reason, ..(*first).clone() }
-}
-
-/// Adds the reasons of the other sources to a refusal, so that the user sees why none of them helped.
-fn with_other_sources(reason: String, source: &str, proposed: &[&Alignment]) -> String {
-    let others = proposed.iter().filter(|alignment| alignment.source != source && alignment.rank == 0);
-    let others: Vec<String> =
-        others.map(|other| format!("by the {}: {}", other.source, one_line(&other.reason))).collect();
-    if others.is_empty() {
-        return reason;
-    }
-    // Details follow after the empty line.
-    let gap = if reason.contains("\n\n") { "\n" } else { "\n\n" };
-    format!("{reason}{gap}{}", others.join("\n"))
-}
-
-fn one_line(reason: &str) -> String {
-    reason.split('\n').filter(|line| !line.is_empty()).collect::<Vec<_>>().join("; ")
 }
