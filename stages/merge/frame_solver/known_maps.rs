@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// What is known of the robots' maps.
 pub(super) struct KnownMaps {
-    /// Whether a robot without a map is worth a word at the end even if no robot has one.
+    /// Whether robots without a map are reported even if no robot has one.
     are_expected: bool,
     /// Whether no map will come any more.
     is_over: bool,
@@ -17,13 +17,19 @@ pub(super) struct KnownMaps {
     /// What is wrong with the maps of robots that have sent none that can be used.
     unusable: BTreeMap<String, GridError>,
     /// Why robots have no map.
-    lost: BTreeMap<String, String>,
+    without_map: BTreeMap<String, String>,
 }
 
 impl KnownMaps {
     /// Of no robot. Maps are expected where nothing else gives frames to robots.
     pub(super) fn new(are_expected: bool) -> Self {
-        Self { are_expected, is_over: false, mapped: BTreeSet::new(), unusable: BTreeMap::new(), lost: BTreeMap::new() }
+        Self {
+            are_expected,
+            is_over: false,
+            mapped: BTreeSet::new(),
+            unusable: BTreeMap::new(),
+            without_map: BTreeMap::new(),
+        }
     }
 
     /// Learns whether a map of a robot can be used. Returns whether that changes what is known.
@@ -39,12 +45,12 @@ impl KnownMaps {
     }
 
     /// Learns why a robot has no map. Returns whether that changes what is known.
-    pub(super) fn lose(&mut self, robot: String, reason: String) -> bool {
-        self.lost.insert(robot, reason.clone()) != Some(reason)
+    pub(super) fn set_without_map(&mut self, robot: String, reason: String) -> bool {
+        self.without_map.insert(robot, reason.clone()) != Some(reason)
     }
 
     /// Learns that no map will come any more. Returns whether that adds to the reasons of robots.
-    pub(super) fn end(&mut self) -> bool {
+    pub(super) fn input_ended(&mut self) -> bool {
         self.is_over = true;
         self.are_expected && self.mapped.is_empty()
     }
@@ -60,28 +66,28 @@ impl KnownMaps {
     }
 
     /// Robots that have no map, with the reason.
-    pub(super) fn lost(&self) -> impl Iterator<Item = (String, String)> {
-        self.lost.iter().map(|(robot, reason)| (robot.clone(), reason.clone()))
+    pub(super) fn without_map(&self) -> impl Iterator<Item = (String, String)> {
+        self.without_map.iter().map(|(robot, reason)| (robot.clone(), reason.clone()))
     }
 
     /// `robots` without those of which nothing can be merged: it is known why they have no map, and they are aligned
     /// with none.
-    pub(super) fn without_lost<'a>(
+    pub(super) fn mergeable<'a>(
         &self,
         robots: &'a BTreeSet<String>,
         alignments: &Alignments,
     ) -> Cow<'a, BTreeSet<String>> {
-        match robots.iter().any(|robot| self.is_lost(robot)) {
+        match robots.iter().any(|robot| self.is_without_map(robot)) {
             false => Cow::Borrowed(robots),
             true => {
-                let is_left = |robot: &&String| !self.is_lost(robot) || is_aligned(robot, alignments);
+                let is_left = |robot: &&String| !self.is_without_map(robot) || is_aligned(robot, alignments);
                 Cow::Owned(robots.iter().filter(is_left).cloned().collect())
             }
         }
     }
 
-    fn is_lost(&self, robot: &str) -> bool {
-        self.lost.contains_key(robot) && !self.has_sent(robot)
+    fn is_without_map(&self, robot: &str) -> bool {
+        self.without_map.contains_key(robot) && !self.has_sent(robot)
     }
 
     /// Reasons why robots are not merged, as alignments give them, with what is known of their maps: where a map cannot
@@ -94,9 +100,9 @@ impl KnownMaps {
         for (robot, reason) in &mut reasons {
             if let Some(error) = self.unusable.get(robot) {
                 *reason = format!("its map cannot be used: {error}");
-            } else if (self.is_lost(robot) || self.lacks_map(robot)) && !is_aligned(robot, alignments) {
-                *reason = match self.lost.get(robot) {
-                    Some(lost) => lost.clone(),
+            } else if (self.is_without_map(robot) || self.lacks_map(robot)) && !is_aligned(robot, alignments) {
+                *reason = match self.without_map.get(robot) {
+                    Some(known) => known.clone(),
                     None => format!("it has sent no map, and by its tags alone: {reason}"),
                 };
             }
@@ -107,8 +113,8 @@ impl KnownMaps {
     /// Puts before the reasons of refused alignments, at the end, which of the two robots has sent no map. Where it is
     /// known of both why they have none, there was nothing to decide, and the verdict is left out.
     pub(super) fn explain_pairs(&self, verdicts: &mut Vec<Verdict>) {
-        let are_lost = |Alignment { a, b, .. }: &Alignment| self.is_lost(a) && self.is_lost(b);
-        verdicts.retain(|verdict| verdict.alignment.accepted || !are_lost(&verdict.alignment));
+        let have_none = |Alignment { a, b, .. }: &Alignment| self.is_without_map(a) && self.is_without_map(b);
+        verdicts.retain(|verdict| verdict.alignment.accepted || !have_none(&verdict.alignment));
         for Alignment { a, b, accepted, reason, .. } in verdicts.iter_mut().map(|verdict| &mut verdict.alignment) {
             let lacking = [&*a, &*b].into_iter().filter(|robot| self.lacks_map(robot));
             let lacking: Vec<String> = lacking.cloned().collect();

@@ -94,8 +94,8 @@ struct FrameSolver {
     frame_ids: BTreeMap<String, String>,
     alignments: Alignments,
     reference: Option<String>,
-    /// Whether robots have been placed in the reference's frame.
-    is_settled: bool,
+    /// Whether the reference stays, as robots have been placed in its frame.
+    reference_is_fixed: bool,
     solution: Solution,
     sent: Option<RobotFrames>,
     tree: Tree,
@@ -116,7 +116,7 @@ impl FrameSolver {
             frame_ids: BTreeMap::new(),
             alignments: BTreeMap::new(),
             reference: None,
-            is_settled: false,
+            reference_is_fixed: false,
             solution: Solution::default(),
             sent: None,
             tree: Tree::default(),
@@ -163,7 +163,7 @@ impl FrameSolver {
         output: &Output<Placement>,
     ) -> Result<(), StageError> {
         let UnmergedRobot { robot, reason } = lost.into_content();
-        if self.maps.lose(robot, reason) { self.solve_and_send(output) } else { Ok(()) }
+        if self.maps.set_without_map(robot, reason) { self.solve_and_send(output) } else { Ok(()) }
     }
 
     /// An alignment changes the solution if it differs from the last one of its pair.
@@ -220,7 +220,7 @@ impl FrameSolver {
                 robots.join(", ")
             ));
         }
-        if self.maps.end() {
+        if self.maps.input_ended() {
             let reasons = std::mem::take(&mut self.solution.unmerged);
             self.solution.unmerged = self.maps.explain(reasons, &self.alignments);
         }
@@ -230,21 +230,20 @@ impl FrameSolver {
 
     fn solve_and_send(&mut self, output: &Output<Placement>) -> Result<(), StageError> {
         // Once robots are placed in its frame, the reference stays, even if a robot with an earlier name appears.
-        let is_settled = self.solution.frames.len() > 1;
-        let robots = self.maps.without_lost(&self.robots, &self.alignments);
+        self.reference_is_fixed |= self.solution.frames.len() > 1;
+        let robots = self.maps.mergeable(&self.robots, &self.alignments);
         self.reference = match &self.wanted {
             Some(wanted) => robots.get(wanted).cloned(),
-            None if is_settled || self.is_settled => self.reference.take(),
+            None if self.reference_is_fixed => self.reference.take(),
             None => {
                 let mut with_maps = robots.iter().filter(|robot| !self.maps.is_unusable(robot));
                 with_maps.next().or_else(|| robots.first()).cloned()
             }
         };
-        self.is_settled |= is_settled;
         if let Some(reference) = &self.reference {
             self.solution = solve(&robots, &self.alignments, reference, &self.parameters, &self.solution);
             // A robot that had a map before it lost its way keeps its place.
-            self.solution.unmerged.extend(self.maps.lost().filter(|(robot, _)| !robots.contains(robot)));
+            self.solution.unmerged.extend(self.maps.without_map().filter(|(robot, _)| !robots.contains(robot)));
             let reasons = std::mem::take(&mut self.solution.unmerged);
             self.solution.unmerged = self.maps.explain(reasons, &self.alignments);
         }
@@ -293,7 +292,7 @@ impl FrameSolver {
         last: bool,
         output: &Output<Placement>,
     ) -> Result<(), StageError> {
-        let is_certain = self.wanted.is_some() || self.is_settled || frames.frames.len() > 1;
+        let is_certain = self.wanted.is_some() || self.reference_is_fixed || frames.frames.len() > 1;
         let transforms = match last || is_certain {
             true => self.tree.update(frames, last),
             false => self.tree.open(&frames.header),
