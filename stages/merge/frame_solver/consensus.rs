@@ -1,17 +1,18 @@
 //! The largest set of alignments that agree with each other.
 //!
 //! A set agrees if each of its edges closes the shortest cycle that it makes with the others, up to the covariances.
-//! The largest one is sought by moves, each of which changes the pose of any number of robots at once. An edge
-//! outside of the set implies a move of the robots at one of its ends relative to those at the other, and other edges
-//! outside may agree with that. The best set of robots to move is a minimum cut: an edge of the set between a robot
-//! that moves and one that stays is lost, an edge outside that agrees with the move is won. A move that wins more
-//! than it loses is made; a move that wins as much as it loses shows that the evidence does not decide between the
+//! The largest one is sought by relocations, each of which changes the pose of any number of robots at once. An edge
+//! outside of the set implies a relocation of the robots at one of its ends relative to those at the other, and other
+//! edges outside may support that. The best set of robots to move is a minimum cut: an edge of the set between a robot
+//! that moves and one that stays is a cost, an edge outside that supports the relocation is a gain. A relocation whose
+//! gain exceeds its cost is made; one whose gain equals its cost shows that the evidence does not decide between the
 //! two (`consistency`).
 //!
-//! Moves by which all robots that move stay together suffice, unless wrong alignments close cycles among themselves
-//! by chance. For let another solution split a set in which no robot depends on one edge alone into k + 1 pieces that
-//! move apart: it loses at least k + 1 edges, and k edges suffice to connect the pieces in another way. What it wins
-//! beyond these k agrees with them, as two edges between the same pieces do, which one move wins together.
+//! Proof sketch: relocations by which all robots that move stay together suffice, unless wrong alignments close cycles
+//! among themselves by chance. Let another solution split a set in which no robot depends on one edge alone into k + 1
+//! pieces that move apart. It gives up at least k + 1 edges, and k edges suffice to connect the pieces in another way.
+//! What it gains beyond these k agrees with them, as two edges between the same pieces do, and one relocation gains
+//! both.
 
 use super::cut::{CutGraph, LeastCut};
 use super::graph::{Cycle, Edge, Forest, Neighbours};
@@ -33,16 +34,16 @@ pub(super) struct Consensus<'a> {
     agrees: Vec<bool>,
 }
 
-/// Gain and loss of an edge outside of the set.
-struct Move {
-    /// Number of edges outside that agree with it, including itself.
-    won: usize,
-    /// Loss if it is followed. `None` if that is more than the gain.
-    lost: Option<LeastCut>,
+/// A relocation of robots by which an edge outside of the set agrees.
+struct Relocation {
+    /// Number of edges outside that agree then, including the one that implies it.
+    gain: usize,
+    /// The robots that move, and the edges of the set that it costs. `None` if these are more than the gain.
+    cut: Option<LeastCut>,
 }
 
 impl<'a> Consensus<'a> {
-    /// Finds a set that no move enlarges, from edges that are known to agree. A cycle is closed if its Mahalanobis
+    /// Finds a set that no relocation enlarges, from edges that are known to agree. A cycle is closed if its Mahalanobis
     /// distance from the identity is within `gate`.
     pub(super) fn find(
         robots: usize,
@@ -63,7 +64,7 @@ impl<'a> Consensus<'a> {
             Reverse(closing[i]).cmp(&Reverse(closing[j])).then(spread(i).total_cmp(&spread(j))).then(i.cmp(&j))
         });
         consensus.extend(&order);
-        while consensus.make_a_move(&order) {}
+        while consensus.relocate(&order) {}
         consensus
     }
 
@@ -78,24 +79,24 @@ impl<'a> Consensus<'a> {
 
     /// Edges that are disputed, with a cycle that shows the contradiction.
     ///
-    /// An edge outside of the set is disputed if following it loses no more than it wins, and so are the edges that
-    /// it may lose. Disputed edges are no evidence for others, so the rest is checked again without them.
+    /// An edge outside of the set is disputed if its relocation costs no more than it gains, and so are the edges that
+    /// it may cost. Disputed edges are no evidence for others, so the rest is checked again without them.
     pub(super) fn disputed(&self) -> BTreeMap<usize, Cycle> {
         let outside = self.outside();
         let mut disputed: BTreeMap<usize, Cycle> = BTreeMap::new();
         loop {
             let before = disputed.len();
-            let mut moves = Moves::new(self, |index| self.agrees[index] && !disputed.contains_key(&index));
+            let mut relocations = Relocations::new(self, |index| self.agrees[index] && !disputed.contains_key(&index));
             for &index in &outside {
                 if disputed.contains_key(&index) {
                     continue;
                 }
-                let Some(cut) = moves.follow(index, &outside).lost else { continue };
+                let Some(cut) = relocations.implied_by(index, &outside).cut else { continue };
                 let Some(cycle) = self.neighbours.cycle(self.edges, index, |index| self.agrees[index]) else {
                     continue;
                 };
-                for lost in std::iter::once(index).chain(cut.in_some_cut) {
-                    disputed.entry(lost).or_insert_with(|| cycle.clone());
+                for edge in std::iter::once(index).chain(cut.edges_in_some_minimum_cut) {
+                    disputed.entry(edge).or_insert_with(|| cycle.clone());
                 }
             }
             if disputed.len() == before {
@@ -133,13 +134,13 @@ impl<'a> Consensus<'a> {
         }
     }
 
-    /// Makes the first move that wins more than it loses. Returns whether there was one.
-    fn make_a_move(&mut self, order: &[usize]) -> bool {
+    /// Makes the first relocation that gains more than it costs. Returns whether there was one.
+    fn relocate(&mut self, order: &[usize]) -> bool {
         let outside = self.outside();
-        let mut moves = Moves::new(self, |index| self.agrees[index]);
+        let mut relocations = Relocations::new(self, |index| self.agrees[index]);
         for &index in &outside {
-            let one = moves.follow(index, &outside);
-            let Some(cut) = one.lost.filter(|cut| cut.cost < one.won) else { continue };
+            let Relocation { gain, cut } = relocations.implied_by(index, &outside);
+            let Some(cut) = cut.filter(|cut| cut.cost < gain) else { continue };
             let before = self.agrees.clone();
             for (agrees, edge) in self.agrees.iter_mut().zip(self.edges) {
                 *agrees &= cut.moves[edge.a] == cut.moves[edge.b];
@@ -156,8 +157,8 @@ impl<'a> Consensus<'a> {
     }
 }
 
-/// Gains and losses of moves of robots, over a part of a set of edges that agree.
-struct Moves<'a> {
+/// Relocations of robots over a part of a set of edges that agree.
+struct Relocations<'a> {
     edges: &'a [Edge],
     gate: f64,
     forest: Forest,
@@ -166,8 +167,8 @@ struct Moves<'a> {
     graph: CutGraph,
 }
 
-impl<'a> Moves<'a> {
-    /// The moves over those edges of the set for which `used` holds. The poses are those of the whole set.
+impl<'a> Relocations<'a> {
+    /// Relocations over those edges of the set for which `used` holds. The poses are those of the whole set.
     fn new(consensus: &Consensus<'a>, used: impl Fn(usize) -> bool) -> Self {
         let Consensus { robots, edges, gate, .. } = *consensus;
         let forest = Forest::grow(robots, edges, 0, |index| consensus.agrees[index]);
@@ -177,23 +178,23 @@ impl<'a> Moves<'a> {
         Self { edges, gate, forest, placed, graph }
     }
 
-    /// Gain and loss when robot b of an edge outside of the set moves so that the edge agrees, while robot a stays.
-    fn follow(&mut self, index: usize, outside: &[usize]) -> Move {
+    /// The relocation by which an edge outside of the set agrees: its robot b moves, and robot a stays.
+    fn implied_by(&mut self, index: usize, outside: &[usize]) -> Relocation {
         let Edge { a: stays, b: moved, transform_a_b: transform_stays_moved } = self.edges[index];
-        let mut wishes = Vec::new();
+        let mut supporting_edges = Vec::new();
         for &other in outside.iter().filter(|&&other| other != index) {
             let Edge { a, b, .. } = self.edges[other];
             for (other_moved, other_stays) in [(b, a), (a, b)] {
                 if self.agree(&transform_stays_moved, [moved, stays], other, [other_moved, other_stays]) {
-                    wishes.push((other_moved, other_stays));
+                    supporting_edges.push((other_moved, other_stays));
                 }
             }
         }
-        let won = wishes.len() + 1;
-        Move { won, lost: self.graph.part(moved, stays, wishes.into_iter(), won) }
+        let gain = supporting_edges.len() + 1;
+        Relocation { gain, cut: self.graph.part(moved, stays, supporting_edges.into_iter(), gain) }
     }
 
-    /// Whether two edges outside imply the same move of the robots at one end relative to those at the other.
+    /// Whether two edges outside imply the same relocation of the robots at one end relative to those at the other.
     fn agree(
         &self,
         transform_stays_moved: &UncertainPose,

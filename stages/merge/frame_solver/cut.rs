@@ -34,8 +34,8 @@ pub(super) struct LeastCut {
     pub(super) cost: usize,
     /// For every robot whether it moves; of several minimum cuts the one in which the fewest move.
     pub(super) moves: Vec<bool>,
-    /// Edges that are in any minimum cut, by rising index.
-    pub(super) in_some_cut: Vec<usize>,
+    /// Edges that are in at least one minimum cut, by rising index.
+    pub(super) edges_in_some_minimum_cut: Vec<usize>,
 }
 
 impl CutGraph {
@@ -56,18 +56,19 @@ impl CutGraph {
         }
     }
 
-    /// Minimum cut when the robot `moves` is to move and `stays` is to stay, and each of `wishes`, pairs of a robot
-    /// that should move and one that should stay, costs one for either that does not. `None` if it costs more than
-    /// `most`.
+    /// Minimum cut when the robot `moves` is to move and `stays` is to stay, and each of `supporting_edges`, pairs of a
+    /// robot that should move and one that should stay, costs one for either that does not. `None` if it costs more
+    /// than `most`.
     pub(super) fn part(
         &mut self,
         moves: usize,
         stays: usize,
-        wishes: impl Iterator<Item = (usize, usize)>,
+        supporting_edges: impl Iterator<Item = (usize, usize)>,
         most: usize,
     ) -> Option<LeastCut> {
         let arcs = self.arcs.len();
-        let terminals = std::iter::once((moves, stays, FIRM)).chain(wishes.map(|(moves, stays)| (moves, stays, 1)));
+        let terminals =
+            std::iter::once((moves, stays, FIRM)).chain(supporting_edges.map(|(moves, stays)| (moves, stays, 1)));
         for (moves, stays, capacity) in terminals {
             self.add(self.mover, moves, [capacity, 0], None);
             self.add(stays, self.stayer, [capacity, 0], None);
@@ -88,7 +89,7 @@ impl CutGraph {
             let reached_by = self.reach(self.mover, Some(self.stayer));
             if reached_by[self.stayer].is_none() {
                 let moves = reached_by[..self.mover].iter().map(Option::is_some).collect();
-                return Some(LeastCut { cost, moves, in_some_cut: self.in_some_cut() });
+                return Some(LeastCut { cost, moves, edges_in_some_minimum_cut: self.edges_in_some_minimum_cut() });
             }
             let mut on_path = Vec::new();
             let mut node = self.stayer;
@@ -130,7 +131,7 @@ impl CutGraph {
 
     /// An edge is in some minimum cut if it has no residual capacity, neither directly nor on another path between
     /// its ends.
-    fn in_some_cut(&self) -> Vec<usize> {
+    fn edges_in_some_minimum_cut(&self) -> Vec<usize> {
         let mut found = Vec::new();
         for (index, arc) in self.arcs.iter().enumerate() {
             if let (Some(edge), 0) = (arc.edge, arc.residual)
@@ -156,14 +157,17 @@ mod tests {
     #[test]
     fn a_chain_is_cut_at_any_of_its_edges() {
         let cut = graph(4, &[(0, 1), (1, 2), (2, 3)]).part(3, 0, std::iter::empty(), 5).unwrap();
-        assert_eq!(cut, LeastCut { cost: 1, moves: vec![false, false, false, true], in_some_cut: vec![0, 1, 2] });
+        assert_eq!(
+            cut,
+            LeastCut { cost: 1, moves: vec![false, false, false, true], edges_in_some_minimum_cut: vec![0, 1, 2] }
+        );
     }
 
     #[test]
-    fn a_wish_moves_the_cut() {
+    fn a_supporting_edge_moves_the_cut() {
         let pairs = [(0, 1), (1, 2), (2, 3)];
         let cut = graph(4, &pairs).part(3, 0, [(1, 0)].into_iter(), 5).unwrap();
-        assert_eq!((cut.cost, cut.in_some_cut), (1, vec![0]));
+        assert_eq!((cut.cost, cut.edges_in_some_minimum_cut), (1, vec![0]));
     }
 
     #[test]
@@ -178,18 +182,18 @@ mod tests {
         #[test]
         fn no_way_to_part_them_is_cheaper(
             pairs in prop::collection::btree_set((0usize..7, 0usize..7), 1..18),
-            wishes in prop::collection::vec((0usize..7, 0usize..7), 0..4),
+            supporting_edges in prop::collection::vec((0usize..7, 0usize..7), 0..4),
         ) {
             let pairs: Vec<(usize, usize)> = pairs.into_iter().filter(|(a, b)| a < b).collect();
             let cost = |sides: u32| {
                 let moves = |robot: usize| sides >> robot & 1 == 1;
                 let cut = pairs.iter().filter(|(a, b)| moves(*a) != moves(*b)).count();
-                let denied = wishes.iter().map(|&(m, s)| usize::from(!moves(m)) + usize::from(moves(s)));
+                let denied = supporting_edges.iter().map(|&(m, s)| usize::from(!moves(m)) + usize::from(moves(s)));
                 cut + denied.sum::<usize>()
             };
             let ways: Vec<u32> = (0..1 << 7).filter(|sides| sides & 0b11 == 0b10).collect();
             let least = ways.iter().map(|&sides| cost(sides)).min().unwrap();
-            let cut = graph(7, &pairs).part(1, 0, wishes.iter().copied(), 99).unwrap();
+            let cut = graph(7, &pairs).part(1, 0, supporting_edges.iter().copied(), 99).unwrap();
             prop_assert_eq!(cut.cost, least);
             let expected: Vec<usize> = (0..pairs.len())
                 .filter(|&index| ways.iter().any(|&sides| {
@@ -197,7 +201,7 @@ mod tests {
                     cost(sides) == least && (sides >> a & 1) != (sides >> b & 1)
                 }))
                 .collect();
-            prop_assert_eq!(cut.in_some_cut, expected);
+            prop_assert_eq!(cut.edges_in_some_minimum_cut, expected);
             let sides = cut.moves.iter().enumerate().map(|(robot, &moves)| u32::from(moves) << robot).sum::<u32>();
             prop_assert_eq!(cost(sides), least);
         }
