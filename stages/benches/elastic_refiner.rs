@@ -6,7 +6,7 @@
 // An error in a bench ends it.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-use gridweave_stages::merge::elastic_refiner::{Body, ElasticRefinerParameters, refine, sharpness};
+use gridweave_stages::registration::non_rigid::{Body, DeformationParameters, refine, sharpness};
 use gridweave_stages::registration::search::{MapAlignerParameters, NamedMap, align_maps};
 use gridweave_stages::shared::geometry::{Grid, GridGeometry, Pose2, pose};
 use gridweave_stages::shared::test_world::building::draw_deformed;
@@ -64,7 +64,7 @@ fn main() {
                 Placed::new(pose(APART * f64::from(column), APART * f64::from(row), yaw), most)
             })
             .collect();
-        let parameters = ElasticRefinerParameters::default();
+        let parameters = DeformationParameters::default();
         let mut nodes = 0;
         let seconds = time(|| {
             let start = Instant::now();

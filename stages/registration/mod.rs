@@ -8,6 +8,8 @@
 //! 4. [`judgement`]: the evidence for each hypothesis is summed, and all of them together give one probability for
 //!    each.
 //!
+//! [`non_rigid`] deforms maps, for the comparison and for the merge.
+//!
 //! [`register`] does all four for a [`PreparedPair`] of maps. The stages [`map_aligner`], [`icp_refiner`] and
 //! [`merge_verifier`] do one step each, so that other methods can propose hypotheses, too.
 
@@ -19,10 +21,14 @@ pub mod icp_refiner;
 pub mod judgement;
 pub mod map_aligner;
 pub mod merge_verifier;
+pub mod non_rigid;
 pub mod pose_window;
 mod register;
 mod scale;
 pub mod search;
+
+#[cfg(test)]
+mod drawn_map;
 
 use gridweave_runtime::stage::StageKind;
 

@@ -1,5 +1,6 @@
 //! Parameters of the stage.
 
+use crate::registration::non_rigid::DeformationParameters;
 use gridweave_runtime::stage::Parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -38,15 +39,24 @@ pub struct ElasticRefinerParameters {
     pub min_growth: f64,
 }
 
+impl ElasticRefinerParameters {
+    /// Those of the deformation itself.
+    pub fn deformation(&self) -> DeformationParameters {
+        let Self { spacing, bend, turn, reach, .. } = *self;
+        DeformationParameters { spacing, bend, turn, reach }
+    }
+}
+
 impl Default for ElasticRefinerParameters {
     fn default() -> Self {
+        let DeformationParameters { spacing, bend, turn, reach } = DeformationParameters::default();
         Self {
             enabled: true,
             keep_reference: false,
-            spacing: 3.0,
-            bend: 0.05,
-            turn: 0.01,
-            reach: 2.0,
+            spacing,
+            bend,
+            turn,
+            reach,
             min_move: 0.1,
             min_turn: 0.01,
             min_growth: 0.25,

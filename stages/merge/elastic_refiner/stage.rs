@@ -1,8 +1,8 @@
 //! The stage: keeps each robot's map and the frames, and deforms the maps of the placed robots when any of them has
 //! changed.
 
-use super::anchor::anchor;
-use super::{Body, ElasticRefinerParameters, RefinedMap, refine, sharpness};
+use super::ElasticRefinerParameters;
+use crate::registration::non_rigid::{Body, RefinedMap, anchor, refine, sharpness};
 use crate::shared::deformation::{Deformation, Lattice};
 use crate::shared::geometry::row_by_row;
 use crate::shared::robot_maps::{RobotMap, RobotMaps};
@@ -139,7 +139,8 @@ impl ElasticRefiner {
     fn deform(&mut self, from_known: bool, output: &Output<Deformations>) -> Result<(), StageError> {
         let frames = self.frames.frames.iter();
         let placed: Vec<_> = frames.filter_map(|frame| Some((frame, self.maps.get(&frame.robot)?))).collect();
-        let spacing = self.parameters.spacing;
+        let deformation = self.parameters.deformation();
+        let spacing = deformation.spacing;
         let of_map = |(frame, map): &(&RobotFrame, &RobotMap<WallsOnDemand>)| {
             let nodes = Lattice::over(&map.grid(), spacing).len();
             (frame.robot.clone(), DeformedMap { number: map.number, nodes, deformation: None })
@@ -164,13 +165,13 @@ impl ElasticRefiner {
                     }
                 })
                 .collect();
-            match refine(&bodies, &self.parameters) {
+            match refine(&bodies, &deformation) {
                 Some(refinement) => {
                     started_from_known = refinement.started_from_known;
                     let mut refined = refinement.if_supported();
                     let reference = placed.iter().position(|(frame, _)| frame.robot == self.frames.reference);
                     reference.into_iter().for_each(|reference| anchor(&mut refined, &bodies, reference));
-                    let sharpness = sharpness(&bodies, &refined, &self.parameters);
+                    let sharpness = sharpness(&bodies, &refined, &deformation);
                     for (((frame, map), refined), sharpness) in placed.iter().zip(&refined).zip(sharpness) {
                         let header = Header::new(output.log_time(), map.frame_id.clone());
                         output.deformation.send(&frame.robot, &message(header, &frame.robot, refined, sharpness))?;

@@ -3,7 +3,7 @@
 
 use super::ComparisonParameters;
 use super::agreement::{Agreement, MapView, compare};
-use crate::merge::elastic_refiner::{Body, ElasticRefinerParameters, deform_onto};
+use crate::registration::non_rigid::{Body, DeformationParameters, deform_onto};
 use crate::shared::deformation::Deformation;
 use crate::shared::geometry::{Point2, PointPair, Pose2, RigidFit, covariance_about, fit_rigid, is_known};
 use crate::shared::walls::{WallMap, stride};
@@ -26,7 +26,7 @@ pub struct Deformed {
     /// Size of map b as it is deformed, as a share of its size. The deformation is estimated as small as the maps
     /// allow, so it does not reach the whole error of a wrong resolution.
     pub scale: f64,
-    /// Cost of the deformation, see [`RefinedMap::cost`](crate::merge::elastic_refiner::RefinedMap::cost).
+    /// Cost of the deformation, see [`RefinedMap::cost`](crate::registration::non_rigid::RefinedMap::cost).
     pub cost: f64,
     /// Agreement of the maps with map b deformed.
     pub agreement: Agreement,
@@ -43,12 +43,12 @@ impl Deformed {
         parameters: &ComparisonParameters,
     ) -> Option<Self> {
         // Map a is fixed, so map b takes the deformation of both.
-        let elastic = ElasticRefinerParameters {
+        let most = DeformationParameters {
             bend: SQRT_2 * parameters.bend,
             turn: SQRT_2 * parameters.turn,
             ..Default::default()
         };
-        let (deformation, cost) = deform_onto(body_a, &body_b.at(*transform_a_b), &elastic)?;
+        let (deformation, cost) = deform_onto(body_a, &body_b.at(*transform_a_b), &most)?;
         let walls = b.walls.deformed(&deformation);
         let deformed = MapView { grid: b.grid, walls: &walls, deformation: Some(&deformation) };
         let (nearest, scale) = nearest_rigid(a, b.walls, transform_a_b, &deformation)?;
@@ -64,7 +64,7 @@ impl Deformed {
 
     /// Two maps, each in its own frame, as they are deformed.
     pub fn bodies<'a>(a: &MapView<'a>, b: &MapView<'a>) -> [Body<'a>; 2] {
-        let spacing = ElasticRefinerParameters::default().spacing;
+        let spacing = DeformationParameters::default().spacing;
         [a, b].map(|map| Body::new(&map.grid, map.walls, Pose2::identity(), spacing))
     }
 }

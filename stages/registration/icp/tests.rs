@@ -2,10 +2,10 @@
 
 use super::{FirstGuess, IcpParameters, IcpRefusal, Metric, Weighting, refine, register};
 use crate::shared::geometry::{Grid, GridGeometry, Pose2, pose};
-use crate::shared::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, guess, seen};
+use crate::shared::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, seen};
 use crate::shared::walls::WallMap;
 use gridweave_runtime::stage::Parameters;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use proptest::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 
@@ -15,6 +15,15 @@ fn office_maps() -> (DrawnMap, DrawnMap) {
     let a = office.draw(seen(-0.2, -0.2, 14.0, 12.2), drawing(3.0, 2.0, 0.4));
     let b = office.draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
     (a, b)
+}
+
+/// A first guess that is off by a shift and a turn about the origin of map b, with a covariance as large.
+fn guess(transform_a_b: Pose2, x: f64, y: f64, yaw: f64) -> FirstGuess {
+    let covariance = Matrix3::from_diagonal(&Vector3::new(0.3 * 0.3, 0.3 * 0.3, 0.05 * 0.05));
+    let mut transform_a_b = transform_a_b;
+    transform_a_b.translation.vector += Vector2::new(x, y);
+    transform_a_b.rotation *= nalgebra::UnitComplex::new(yaw);
+    FirstGuess { transform_a_b, covariance }
 }
 
 fn assert_near(found: &Pose2, truth: &Pose2, map_b: &DrawnMap) {

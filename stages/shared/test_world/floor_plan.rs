@@ -1,11 +1,9 @@
 //! Floor plans, and robots' maps of them.
 
-use crate::registration::comparison::MapView;
-use crate::registration::icp::FirstGuess;
 use crate::shared::geometry::{Cell, Grid, GridGeometry, Point2, Pose2, UNKNOWN};
 use crate::shared::walls::{NORMAL_RADIUS, WallMap};
 use gridweave_runtime::ros::MapMetaData;
-use nalgebra::{Matrix3, Vector2, Vector3};
+use nalgebra::Vector2;
 
 /// Half of a wall's thickness, metres.
 const HALF_WALL: f64 = 0.06;
@@ -199,14 +197,14 @@ impl DrawnMap {
         self.cells.iter().map(|cell| *cell as u8).collect()
     }
 
-    /// The map as it is compared with others.
-    pub fn view(&self) -> MapView<'_> {
-        MapView::rigid(Grid::new(self.geometry, &self.cells).unwrap(), &self.walls)
+    /// The grid of its cells.
+    pub fn grid(&self) -> Grid<'_> {
+        Grid::new(self.geometry, &self.cells).unwrap()
     }
 
     /// This map deformed by drift: every point is displaced by [`deformation_at`].
     pub fn deformed(&self, most: f64) -> Self {
-        let grid = Grid::new(self.geometry, &self.cells).unwrap();
+        let grid = self.grid();
         let cells = (0..self.cells.len()).map(|index| {
             let cell = Cell { column: index % self.geometry.width, row: index / self.geometry.width };
             let shown = self.geometry.centre(cell);
@@ -232,15 +230,6 @@ pub fn deformation_at(most: f64, place: &Point2) -> Vector2<f64> {
 /// A map in cells of 0.05 m whose frame is at (x, y), metres, turned by `yaw` radians.
 pub fn drawing(x: f64, y: f64, yaw: f64) -> Drawing {
     Drawing { transform_world_map: crate::shared::geometry::pose(x, y, yaw), resolution: 0.05, grid_yaw: 0.0 }
-}
-
-/// A first guess that is off by a shift and a turn about the origin of map b, with a covariance as large.
-pub fn guess(transform_a_b: Pose2, x: f64, y: f64, yaw: f64) -> FirstGuess {
-    let covariance = Matrix3::from_diagonal(&Vector3::new(0.3 * 0.3, 0.3 * 0.3, 0.05 * 0.05));
-    let mut transform_a_b = transform_a_b;
-    transform_a_b.translation.vector += Vector2::new(x, y);
-    transform_a_b.rotation *= nalgebra::UnitComplex::new(yaw);
-    FirstGuess { transform_a_b, covariance }
 }
 
 /// Distance of two transforms: metres in the plan's middle, and radians.

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 
 /// Moves all maps together so that the rigid transform nearest to the deformation of the reference map is the
 /// identity. The deformations of the other maps follow, as they are in frames that stay.
-pub(super) fn anchor(maps: &mut [RefinedMap], bodies: &[Body<'_>], reference: usize) {
+pub fn anchor(maps: &mut [RefinedMap], bodies: &[Body<'_>], reference: usize) {
     let Some(change) = maps.get(reference).and_then(change) else { return };
     let of_maps: Vec<Pose2> = bodies
         .iter()

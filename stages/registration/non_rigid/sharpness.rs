@@ -1,7 +1,7 @@
 //! Sharpness of the merged map: the thickness spread of walls, and the share of double walls.
 
 use super::contacts::{DeformedBody, apart};
-use super::{Body, ElasticRefinerParameters, RefinedMap};
+use super::{Body, DeformationParameters, RefinedMap};
 use gridweave_runtime::ros::Sharpness;
 use rayon::prelude::*;
 
@@ -32,11 +32,7 @@ impl Sum {
 }
 
 /// For each body, the sharpness of the walls that other maps have as well: with rigid maps, and with deformation.
-pub fn sharpness(
-    bodies: &[Body<'_>],
-    maps: &[RefinedMap],
-    parameters: &ElasticRefinerParameters,
-) -> Vec<[Sharpness; 2]> {
+pub fn sharpness(bodies: &[Body<'_>], maps: &[RefinedMap], parameters: &DeformationParameters) -> Vec<[Sharpness; 2]> {
     let deformed = bodies.iter().zip(maps).map(|(body, map)| DeformedBody::new(body, map.deformation.clone(), 0));
     let deformed: Vec<DeformedBody<'_>> = deformed.collect();
     let of_body = |b: usize| {

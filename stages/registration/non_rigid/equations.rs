@@ -1,6 +1,6 @@
 //! Normal equations of all nodes of all maps, and their solution.
 
-use super::ElasticRefinerParameters;
+use super::DeformationParameters;
 use super::body::Body;
 use crate::shared::deformation::Deformation;
 use crate::shared::geometry::Point2;
@@ -44,7 +44,7 @@ impl Equations {
     pub(super) fn of_deformations(
         bodies: &[Body<'_>],
         unknowns: &Arc<Unknowns>,
-        parameters: &ElasticRefinerParameters,
+        parameters: &DeformationParameters,
     ) -> Self {
         let count = unknowns.count;
         let mut equations = Self {
@@ -70,12 +70,7 @@ impl Equations {
 
     /// Adds the prior on two neighbouring nodes: the displacement between them is that of a rigid piece that is
     /// turned by the mean of both, and both are turned alike.
-    fn add_edge(
-        &mut self,
-        (i, at_i): (usize, Point2),
-        (j, at_j): (usize, Point2),
-        parameters: &ElasticRefinerParameters,
-    ) {
+    fn add_edge(&mut self, (i, at_i): (usize, Point2), (j, at_j): (usize, Point2), parameters: &DeformationParameters) {
         let Edge { by_i, by_j, information } = Edge::new(&(at_j - at_i), parameters);
         self.add(i, i, &(by_i.transpose() * information * by_i));
         self.add(j, i, &(by_j.transpose() * information * by_i));
@@ -130,7 +125,7 @@ pub(super) struct Edge {
 
 impl Edge {
     /// Edge between two nodes with `arm` from i to j, metres.
-    pub(super) fn new(arm: &Vector2<f64>, parameters: &ElasticRefinerParameters) -> Self {
+    pub(super) fn new(arm: &Vector2<f64>, parameters: &DeformationParameters) -> Self {
         let deviation = Vector3::new(parameters.bend, parameters.bend, parameters.turn) * arm.norm().sqrt();
         let half = 0.5 * arm;
         Self {
@@ -142,7 +137,7 @@ impl Edge {
 }
 
 /// Half the squared deformations between neighbouring nodes, in standard deviations.
-pub(super) fn deformation_cost(deformation: &Deformation, parameters: &ElasticRefinerParameters) -> f64 {
+pub(super) fn deformation_cost(deformation: &Deformation, parameters: &DeformationParameters) -> f64 {
     let edges = deformation.lattice.edges().map(|(i, j)| {
         let edge = Edge::new(&(deformation.lattice.position(j) - deformation.lattice.position(i)), parameters);
         let residual = edge.by_i * deformation.moves[i] + edge.by_j * deformation.moves[j];

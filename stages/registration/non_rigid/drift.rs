@@ -1,6 +1,6 @@
 //! Estimates the drift of a map, which the parameters `bend` and `turn` assume.
 
-use super::ElasticRefinerParameters;
+use super::DeformationParameters;
 use super::equations::{Covariances, Edge};
 use crate::shared::deformation::Deformation;
 use nalgebra::Matrix3;
@@ -24,7 +24,7 @@ pub(super) fn drift(
     deformation: &Deformation,
     first: usize,
     covariances: &Covariances<'_>,
-    parameters: &ElasticRefinerParameters,
+    parameters: &DeformationParameters,
 ) -> Option<Drift> {
     let (mut squares, mut known) = ([0.0; 2], [0.0; 2]);
     for (i, j) in deformation.lattice.edges() {

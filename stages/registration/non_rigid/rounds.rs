@@ -1,6 +1,6 @@
 //! The rounds in which the deformations of all maps are estimated together.
 
-use super::ElasticRefinerParameters;
+use super::DeformationParameters;
 use super::body::Body;
 use super::contacts::{Contacts, DeformedBody, contacts};
 use super::equations::{Equations, Solution, Unknowns};
@@ -39,7 +39,7 @@ pub(super) struct Round {
 
 /// Estimates the deformations of all bodies. Where most of them are known from before, the others are first aligned
 /// with them, and then all together. `None` if the equations have no solution, or one that is not finite.
-pub(super) fn estimate<'a>(bodies: &'a [Body<'a>], parameters: &ElasticRefinerParameters) -> Option<Estimate<'a>> {
+pub(super) fn estimate<'a>(bodies: &'a [Body<'a>], parameters: &DeformationParameters) -> Option<Estimate<'a>> {
     let rounds = Rounds::new(bodies, parameters);
     let nodes = |is_counted: fn(&Body<'_>) -> bool| -> usize {
         bodies.iter().filter(|body| is_counted(body)).map(|body| body.shape.lattice.len()).sum()
@@ -74,13 +74,13 @@ pub(super) fn estimate<'a>(bodies: &'a [Body<'a>], parameters: &ElasticRefinerPa
 /// What all rounds have in common.
 struct Rounds<'a> {
     bodies: &'a [Body<'a>],
-    parameters: &'a ElasticRefinerParameters,
+    parameters: &'a DeformationParameters,
     /// Bodies that are near each other, in both orders.
     pairs: Vec<(usize, usize)>,
 }
 
 impl<'a> Rounds<'a> {
-    fn new(bodies: &'a [Body<'a>], parameters: &'a ElasticRefinerParameters) -> Self {
+    fn new(bodies: &'a [Body<'a>], parameters: &'a DeformationParameters) -> Self {
         let boxes: Vec<Option<[Point2; 2]>> = bodies.iter().map(|body| known_box(body, parameters.reach)).collect();
         let is_below = |low: &Point2, high: &Point2| low.x <= high.x && low.y <= high.y;
         let meet = |a: usize, b: usize| {

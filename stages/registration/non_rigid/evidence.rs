@@ -1,6 +1,6 @@
 //! Evidence for the deformation of maps against rigid maps.
 
-use super::ElasticRefinerParameters;
+use super::DeformationParameters;
 use super::body::Body;
 use super::equations::{Equations, Solution};
 use super::rounds::Round;
@@ -15,7 +15,7 @@ const LITTLE: f64 = 0.25;
 ///
 /// The walls are those of the last round. Their error is assumed to be one cell in every half metre: all of a wall is
 /// rounded to cells alike, which must not look like a deformation.
-pub(super) fn gain(bodies: &[Body<'_>], last: &Round, parameters: &ElasticRefinerParameters) -> Option<f64> {
+pub(super) fn gain(bodies: &[Body<'_>], last: &Round, parameters: &DeformationParameters) -> Option<f64> {
     let log_ratio = |of_deformations: &Equations, solution: &Solution| {
         Some(0.5 * (of_deformations.log_determinant()? - solution.log_determinant() + solution.explained))
     };
@@ -23,7 +23,7 @@ pub(super) fn gain(bodies: &[Body<'_>], last: &Round, parameters: &ElasticRefine
     // Only the sign counts, and most deformed maps are clearly so.
     if best <= 0.0 {
         let little =
-            ElasticRefinerParameters { bend: LITTLE * parameters.bend, turn: LITTLE * parameters.turn, ..*parameters };
+            DeformationParameters { bend: LITTLE * parameters.bend, turn: LITTLE * parameters.turn, ..*parameters };
         let of_deformations = Equations::of_deformations(bodies, &last.of_deformations.unknowns, &little);
         let mut equations = of_deformations.clone();
         last.walls.iter().for_each(|contacts| contacts.add_to(&mut equations));

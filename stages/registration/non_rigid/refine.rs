@@ -1,6 +1,6 @@
 //! Deforms all maps together, and says how certain that is.
 
-use super::ElasticRefinerParameters;
+use super::DeformationParameters;
 use super::body::Body;
 use super::contacts::DeformedBody;
 use super::drift::{Drift, drift};
@@ -55,7 +55,7 @@ impl RefinedMap {
 
 /// Deforms placed maps so that walls that several of them have are aligned. `None` if the equations have no solution,
 /// because numbers are too large.
-pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Option<Refinement> {
+pub fn refine(bodies: &[Body<'_>], parameters: &DeformationParameters) -> Option<Refinement> {
     let Estimate { bodies: deformed, started_from_known, last } = estimate(bodies, parameters)?;
     let gain = gain(bodies, &last, parameters)?;
     let covariances = last.solution.covariances();
@@ -74,11 +74,7 @@ pub fn refine(bodies: &[Body<'_>], parameters: &ElasticRefinerParameters) -> Opt
 }
 
 /// Deforms a map onto a fixed one, and returns its deformation with the cost of it, as [`RefinedMap::cost`].
-pub fn deform_onto(
-    fixed: &Body<'_>,
-    map: &Body<'_>,
-    parameters: &ElasticRefinerParameters,
-) -> Option<(Deformation, f64)> {
+pub fn deform_onto(fixed: &Body<'_>, map: &Body<'_>, parameters: &DeformationParameters) -> Option<(Deformation, f64)> {
     let bodies = [fixed.clone().kept(), map.clone()];
     let DeformedBody { deformation, .. } = estimate(&bodies, parameters)?.bodies.pop()?;
     let cost = deformation_cost(&deformation, parameters);
