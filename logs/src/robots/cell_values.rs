@@ -16,6 +16,8 @@ use std::fmt;
 const INSCRIBED: i8 = 99;
 /// The value of an obstacle, in costmaps and in maps.
 const LETHAL: i8 = 100;
+/// The value of a cell that is as likely occupied as free.
+const EVEN_ODDS: i8 = 50;
 /// Two classes of values explain more of their variance than this: as much as they explain of values that are spread
 /// evenly.
 const EVEN_SPREAD: f64 = 0.75;
@@ -27,8 +29,8 @@ const LEAST_CONTRAST: f64 = 20.0;
 #[serde(rename_all = "snake_case")]
 pub enum CellValues {
     /// By the distribution of the values in each map: as `occupancy` where some cells are occupied and some free; as
-    /// `costmap` where obstacles are inflated; else as `two_classes` where the values fall into two classes. Values
-    /// outside -1 to 100 are read as those of an image or of a costmap from 0 to 255, where they fit, and else as
+    /// `costmap` where obstacles are inflated; as `probabilities` where else most of what is likely occupied, or free,
+    /// would be unknown; as `two_classes` where the values fall into two classes. Values outside -1 to 100 are read as those of an image or of a costmap from 0 to 255, where they fit, and else as
     /// unknown.
     #[default]
     Auto,
@@ -36,6 +38,8 @@ pub enum CellValues {
     Occupancy,
     /// As nav2's costmaps: 100 is an obstacle, and costs that fall with the distance from it are free space.
     Costmap,
+    /// As Cartographer after a few scans: above 50 is occupied and below 50 free.
+    Probabilities,
     /// The larger of two classes of values is occupied and the smaller free, whatever they are: 0 and 1, 30 and 70, 25
     /// and 100.
     TwoClasses,
@@ -48,6 +52,8 @@ pub(crate) enum Convention {
     Occupancy,
     /// Obstacles with the costs around them.
     Costmap,
+    /// Above 50 occupied, below 50 free.
+    Probabilities,
     /// The means of two classes of values, free and occupied.
     TwoClasses { free: f64, occupied: f64 },
 }
@@ -57,6 +63,9 @@ impl fmt::Display for Convention {
         match self {
             Self::Occupancy => f.write_str("cells are read as occupancy"),
             Self::Costmap => f.write_str("a costmap: costs below 100 are read as free, 100 as occupied"),
+            Self::Probabilities => {
+                f.write_str("values are read as probabilities: below 50 as free, above 50 as occupied")
+            }
             Self::TwoClasses { free, occupied } => {
                 write!(f, "values about {free:.0} are read as free, values about {occupied:.0} as occupied")
             }
@@ -72,6 +81,7 @@ impl CellValues {
         let read = match convention {
             Convention::Occupancy => Cow::Borrowed(cells),
             Convention::Costmap => Cow::Owned(without_costs(info.width as usize, cells)),
+            Convention::Probabilities => Cow::Owned(cells.iter().map(|value| by_probability(*value)).collect()),
             Convention::TwoClasses { free, occupied } => {
                 let scaled = |value: i8| {
                     let share = (f64::from(value) - free) / (occupied - free);
@@ -104,14 +114,15 @@ impl CellValues {
     }
 
     fn convention(self, width: usize, cells: &[i8]) -> Convention {
-        let classes = |counts: &Counts| match counts.two_classes() {
-            Some((free, occupied)) => Convention::TwoClasses { free, occupied },
-            None => Convention::Occupancy,
+        let classes = |classes: Option<Classes>| {
+            let between = |Classes { free, occupied, .. }| Convention::TwoClasses { free, occupied };
+            classes.map_or(Convention::Occupancy, between)
         };
         match self {
             Self::Occupancy => Convention::Occupancy,
             Self::Costmap => Convention::Costmap,
-            Self::TwoClasses => classes(&Counts::of(cells)),
+            Self::Probabilities => Convention::Probabilities,
+            Self::TwoClasses => classes(Counts::of(cells).classes()),
             Self::Auto => {
                 let counts = Counts::of(cells);
                 let has = |is: fn(i8) -> bool| (0..=LETHAL).any(|value| is(value) && counts.of_value(value) > 0);
@@ -123,8 +134,12 @@ impl CellValues {
                     {
                         Convention::Costmap
                     }
+                    true if counts.are_probabilities() => Convention::Probabilities,
                     true => Convention::Occupancy,
-                    false => classes(&counts),
+                    false => match classes(counts.two_classes()) {
+                        Convention::Occupancy if counts.are_probabilities() => Convention::Probabilities,
+                        convention => convention,
+                    },
                 }
             }
         }
@@ -147,16 +162,37 @@ impl Counts {
         usize::try_from(value).ok().and_then(|index| self.0.get(index)).copied().unwrap_or(0)
     }
 
+    /// Whether there are values on both sides of 50, and most of those on one side are near it: map servers take them for
+    /// unknown.
+    fn are_probabilities(&self) -> bool {
+        let sum = |is: fn(i8) -> bool, within: std::ops::RangeInclusive<i8>| {
+            within.filter(|value| is(*value)).map(|value| self.of_value(value)).sum::<u64>()
+        };
+        let (below, above) = (0..=EVEN_ODDS - 1, EVEN_ODDS + 1..=LETHAL);
+        let (free, occupied) = (sum(cell::is_free, below.clone()), sum(cell::is_occupied, above.clone()));
+        let (all_below, all_above) = (sum(|_| true, below), sum(|_| true, above));
+        all_below > 0 && all_above > 0 && (2 * free < all_below || 2 * occupied < all_above)
+    }
+
     /// The means of the two classes into which the values fall, the larger of which has fewer cells as walls have;
-    /// `None` if they are one class. The classes are those of Otsu, "A threshold selection method from gray-level
-    /// histograms" (1979).
-    fn two_classes(&self) -> Option<(f64, f64)> {
+    /// `None` if they are one class.
+    fn two_classes(&self) -> Option<Classes> {
+        // Of 0 and one other value, 0 is free and the other occupied, however small it is.
+        let is_binary = self.0[0] > 0 && self.0.iter().filter(|count| **count > 0).count() == 2;
+        let is_contrast = |classes: &Classes| is_binary || classes.occupied - classes.free >= LEAST_CONTRAST;
+        self.classes()
+            .filter(|classes| classes.explained > EVEN_SPREAD && is_contrast(classes) && classes.has_fewer_walls)
+    }
+
+    /// The two classes with the least variance within them (Otsu, "A threshold selection method from gray-level
+    /// histograms", 1979); `None` if there is one value only.
+    fn classes(&self) -> Option<Classes> {
         let total = self.0.iter().sum::<u64>() as f64;
         let values = || self.0.iter().enumerate().map(|(value, count)| (value as f64, *count as f64));
         let mean = values().map(|(value, count)| value * count).sum::<f64>() / total;
         let variance = values().map(|(value, count)| (value - mean).powi(2) * count).sum::<f64>() / total;
         let (mut below, mut sum) = (0.0, 0.0);
-        let mut best: Option<(f64, [f64; 4])> = None;
+        let mut best: Option<Classes> = None;
         for (value, count) in values() {
             below += count;
             sum += value * count;
@@ -164,17 +200,36 @@ impl Counts {
             if below == 0.0 || above == 0.0 {
                 continue;
             }
-            let (low, high) = (sum / below, (mean * total - sum) / above);
-            let between = below * above / (total * total) * (high - low).powi(2);
-            if best.is_none_or(|(most, _)| between > most) {
-                best = Some((between, [low, high, below, above]));
+            let (free, occupied) = (sum / below, (mean * total - sum) / above);
+            let between = below * above / (total * total) * (occupied - free).powi(2);
+            let explained = between / variance;
+            if best.is_none_or(|best| explained > best.explained) {
+                best = Some(Classes { free, occupied, explained, has_fewer_walls: above < below });
             }
         }
-        let (between, [low, high, below, above]) = best?;
-        // Of 0 and one other value, 0 is free and the other occupied, however small it is.
-        let is_binary = self.0[0] > 0 && self.0.iter().filter(|count| **count > 0).count() == 2;
-        let is_contrast = is_binary || high - low >= LEAST_CONTRAST;
-        (between > EVEN_SPREAD * variance && is_contrast && above < below).then_some((low, high))
+        best
+    }
+}
+
+/// Two classes of values.
+#[derive(Clone, Copy)]
+struct Classes {
+    /// The mean of the smaller values.
+    free: f64,
+    /// The mean of the larger values.
+    occupied: f64,
+    /// The share of the variance of all values that is between the classes.
+    explained: f64,
+    /// Whether fewer cells have the larger values.
+    has_fewer_walls: bool,
+}
+
+/// A cell by its probability of being occupied, in percent.
+fn by_probability(value: i8) -> i8 {
+    match value {
+        _ if !cell::is_known(value) || value == EVEN_ODDS => cell::UNKNOWN,
+        _ if value > EVEN_ODDS => LETHAL,
+        _ => 0,
     }
 }
 
@@ -220,8 +275,26 @@ mod tests {
     }
 
     #[test]
-    fn values_of_one_class_are_left_as_they_are() {
+    fn probabilities_are_split_where_most_walls_or_most_free_space_would_be_unknown() {
+        // Cartographer after a few scans, with some cells that are sure; and weak walls beside sure free space.
+        for cells in [
+            [[20; 2], [43; 2], [43; 2], [43; 2], [57; 2], [50, N], [70, 60]].concat(),
+            [[0; 2], [0; 2], [0; 2], [0; 2], [60; 2], [50, N], [100, 60]].concat(),
+        ] {
+            let (read, convention) = read(CellValues::Auto, 14, &cells);
+            assert_eq!(convention, Convention::Probabilities);
+            assert_eq!(read, [0, 0, 0, 0, 0, 0, 0, 0, 100, 100, N, N, 100, 100]);
+        }
+        let sure = [0, 0, 0, 30, 50, 50, 50, 50, 100, 100, 60, N];
+        assert_eq!(read(CellValues::Auto, 12, &sure).1, Convention::Occupancy, "50 is unknown");
+        // What the user demands is done.
         let spread: Vec<i8> = (30..60).collect();
+        assert!(matches!(read(CellValues::TwoClasses, 30, &spread).1, Convention::TwoClasses { .. }));
+    }
+
+    #[test]
+    fn values_of_one_class_are_left_as_they_are() {
+        let spread: Vec<i8> = (20..50).collect();
         for cells in [&spread[..], &[0, 1, 2, 3, 2, 1, 0], &[40, 40, 41], &[1, 1, 1, 0]] {
             assert_eq!(read(CellValues::Auto, 1, cells).1, Convention::Occupancy, "{cells:?}");
         }
@@ -252,7 +325,7 @@ mod tests {
         fn what_is_read_is_in_the_convention_of_map_servers_and_unknown_cells_stay_so(
             cells in proptest::collection::vec(any::<i8>(), 0..60),
             width in 0_u32..9,
-            values in prop_oneof![Just(CellValues::Auto), Just(CellValues::Costmap), Just(CellValues::TwoClasses)],
+            values in prop_oneof![Just(CellValues::Auto), Just(CellValues::Costmap), Just(CellValues::TwoClasses), Just(CellValues::Probabilities)],
         ) {
             let info = MapMetaData { width, ..Default::default() };
             let (read, convention) = values.read(&info, &cells);

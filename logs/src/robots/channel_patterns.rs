@@ -2,7 +2,7 @@
 
 use super::driver_topics::DriverTopics;
 use super::role::{Classified, PoseSource, Role};
-use super::scan_topics::ScanTopics;
+use super::scan_topics::{ScanTopics, is_sensor};
 use super::tag_reader::{TagReader, known_fields};
 use crate::robot_name::fits;
 use crate::schemas::full_type_name;
@@ -12,6 +12,7 @@ use gridweave_runtime::ros::{
     TopologicalMap,
 };
 use gridweave_runtime::stage::{RobotTopics, TagFields, match_robot};
+use std::collections::BTreeSet;
 
 /// Topic of the robot's pose in its map, as published by AMCL and other localizers.
 const LOCALIZER_POSE: &str = "/{robot}/amcl_pose";
@@ -44,13 +45,14 @@ pub(super) struct ChannelPatterns {
 impl ChannelPatterns {
     /// Chooses the topics from the channels of logs.
     pub(super) fn new(topics: RobotTopics, channels: &[&Channel]) -> Self {
+        let scan_topics = ScanTopics::new(&topics.scan, channels);
         let odometry = channels.iter().filter(|channel| full_type_name(&channel.schema_name) == Odometry::NAME);
-        Self {
-            scan_topics: ScanTopics::new(&topics.scan, channels),
-            odometry_topics: DriverTopics::choose(&ODOMETRY, odometry.map(|channel| channel.topic.as_str())),
-            map_updates: format!("{}_updates", topics.map),
-            topics,
-        }
+        let odometry = odometry.map(|channel| channel.topic.as_str());
+        let mut odometry_topics = DriverTopics::choose(&ODOMETRY, odometry.clone());
+        let scanned: BTreeSet<&str> = channels.iter().filter_map(|channel| scan_topics.robot(channel)).collect();
+        // The odometry of a camera is in the frame of the camera.
+        odometry_topics.add_only_ones(&scanned, odometry.filter(|topic| !topic.split('/').skip(2).any(is_sensor)));
+        Self { scan_topics, odometry_topics, map_updates: format!("{}_updates", topics.map), topics }
     }
 
     /// Whether the pipeline names frames of robots in tf. Then poses come from tf only.

@@ -1,7 +1,7 @@
 //! Topics that drivers use by default, under the names of robots.
 
 use gridweave_runtime::stage::match_robot;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The topic of each robot that is read, of those that drivers use for one thing.
 #[derive(Clone, Debug, Default)]
@@ -24,6 +24,20 @@ impl DriverTopics {
             }
         }
         Self(ranked.into_iter().map(|(robot, (_, topic))| (topic.to_owned(), robot.to_owned())).collect())
+    }
+
+    /// Chooses for each of some robots without a topic the only one in its namespace, under whatever name.
+    pub(super) fn add_only_ones<'a>(&mut self, robots: &BTreeSet<&str>, topics: impl Iterator<Item = &'a str>) {
+        let known: BTreeSet<String> = self.0.values().cloned().collect();
+        let mut found: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+        for topic in topics {
+            let Some((robot, _)) = topic.strip_prefix('/').and_then(|rest| rest.split_once('/')) else { continue };
+            if robots.contains(robot) && !known.contains(robot) {
+                found.entry(robot).or_default().push(topic);
+            }
+        }
+        let only = found.into_iter().filter_map(|(robot, topics)| Some((robot, <[&str; 1]>::try_from(topics).ok()?)));
+        self.0.extend(only.map(|(robot, [topic])| (topic.to_owned(), robot.to_owned())));
     }
 
     /// The robot that a topic was chosen for.
@@ -50,6 +64,9 @@ mod tests {
         let mut topics = DriverTopics::choose(&names, all.into_iter());
         let chosen = |topics: &DriverTopics| all.map(|topic| topics.robot(topic).unwrap_or_default().to_owned());
         assert_eq!(chosen(&topics), ["b", "a", "", "", "", "camera", "", ""]);
+        let lone = ["/c/base/sensors/odometry", "/d/wheels", "/d/fused", "/e/odometry/x", "/b/more"];
+        topics.add_only_ones(&["b", "c", "d"].into(), lone.into_iter());
+        assert_eq!(lone.map(|topic| topics.robot(topic).unwrap_or_default()), ["c", "", "", "", ""]);
         topics.retain(|robot| robot != "a");
         assert_eq!(chosen(&topics), ["b", "", "", "", "", "camera", "", ""]);
     }

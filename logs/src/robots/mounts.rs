@@ -5,7 +5,8 @@ use gridweave_runtime::ros::Transform;
 use nalgebra::Isometry3;
 
 /// Usual names of a robot's base frame, without the robot's name. The first that tf connects to the map is used.
-pub(crate) const BASES: [&str; 4] = ["/base_link", "/base_footprint", "_base_link", "_base_footprint"];
+pub(crate) const BASES: [&str; 7] =
+    ["/base_link", "/base_footprint", "_base_link", "_base_footprint", "/base", "/chassis", "_base"];
 
 /// The tf frames of robots, and the names of their base frames.
 #[derive(Clone, Debug)]

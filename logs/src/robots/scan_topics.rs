@@ -55,7 +55,7 @@ impl ScanTopics {
 }
 
 /// Whether a name is that of a sensor, as in `/front_camera/points`, and not of a robot.
-fn is_sensor(name: &str) -> bool {
+pub(super) fn is_sensor(name: &str) -> bool {
     const SENSORS: [&str; 16] = [
         "cam",
         "camera",

@@ -9,6 +9,14 @@ const LARGEST_STEP: f64 = 0.5;
 const LARGEST_SPEED: f64 = 20.0;
 const LARGEST_TURN: f64 = 0.5;
 const LARGEST_TURN_RATE: f64 = 15.0;
+/// Pause of the messages, seconds, in which a driver may have started again unseen: after it the robot is where it can
+/// have driven at twice its largest speed so far, or at this one, metres per second.
+const PAUSE: f64 = 1.0;
+const USUAL_SPEED: f64 = 1.0;
+/// Least time over which a speed is measured, seconds.
+const LEAST_TIME: f64 = 0.1;
+/// Distance from the origin, metres and radians, at which a driver begins.
+const AT_ORIGIN: f64 = 0.05;
 
 /// The odometry of a robot without its leaps. A driver that starts again begins at the origin, while the robot stands
 /// where it stood.
@@ -20,6 +28,10 @@ pub(super) struct ContinuousOdometry {
     transform_track_odometry: Pose2,
     /// Time of the first leap.
     first_leap: Option<LogTime>,
+    /// Time and length, seconds, of the last pause after which odometry leapt: nothing shows how the robot moved in it.
+    blind_pause: Option<(LogTime, f64)>,
+    /// Largest speed so far, metres per second.
+    fastest: f64,
     has_moved: bool,
 }
 
@@ -31,8 +43,19 @@ impl ContinuousOdometry {
             let moved = last.inv_mul(pose);
             let (way, turn) = (moved.translation.vector.norm(), moved.rotation.angle().abs());
             self.has_moved |= way > 0.0 || turn > 0.0;
-            if way > LARGEST_STEP + LARGEST_SPEED * passed || turn > LARGEST_TURN + LARGEST_TURN_RATE * passed {
+            let is_at_origin =
+                |pose: &Pose2| pose.translation.vector.norm() < AT_ORIGIN && pose.rotation.angle().abs() < AT_ORIGIN;
+            let has_paused = passed > PAUSE;
+            let starts_again = has_paused && is_at_origin(pose) && last.translation.vector.norm() > LARGEST_STEP;
+            let speed = if has_paused { USUAL_SPEED.max(2.0 * self.fastest) } else { LARGEST_SPEED };
+            let is_far = way > LARGEST_STEP + speed * passed || turn > LARGEST_TURN + LARGEST_TURN_RATE * passed;
+            if !is_far && !starts_again {
+                self.fastest = self.fastest.max(way / passed.max(LEAST_TIME));
+            } else {
                 self.first_leap.get_or_insert(time);
+                if has_paused {
+                    self.blind_pause = Some((time, passed));
+                }
                 self.transform_track_odometry = self.transform_track_odometry * last * pose.inverse();
             }
         }
@@ -43,6 +66,11 @@ impl ContinuousOdometry {
     /// When the odometry leapt for the first time.
     pub(super) fn first_leap(&self) -> Option<LogTime> {
         self.first_leap
+    }
+
+    /// Time of the end and length, seconds, of the last pause after which odometry leapt.
+    pub(super) fn blind_pause(&self) -> Option<(LogTime, f64)> {
+        self.blind_pause
     }
 
     /// Whether there are messages, and all have the same pose.
@@ -89,6 +117,29 @@ mod tests {
         odometry.follow(at(60.05), &pose(30.4, 5.0, -3.0));
         assert_eq!(odometry.first_leap(), None);
         assert!(!odometry.stands_still());
+    }
+
+    #[test]
+    fn a_driver_that_starts_again_in_a_pause_leaps() {
+        for start in [pose(0.0, 0.0, 0.0), pose(-30.0, 2.0, 1.0)] {
+            let mut odometry = ContinuousOdometry::default();
+            for tick in 0..100 {
+                let seconds = 0.1 * f64::from(tick);
+                odometry.follow(at(seconds), &pose(0.6 * seconds, 0.0, 0.0));
+            }
+            assert_eq!(odometry.blind_pause(), None);
+            let found = odometry.follow(at(21.9), &start);
+            assert!((found.translation.x - 0.6 * 9.9).abs() < 1e-9, "the robot is where it was");
+            let (end, passed) = odometry.blind_pause().unwrap();
+            assert!(end == at(21.9) && (passed - 12.0).abs() < 1e-6);
+        }
+        // One that has gone on, and one that waits at its start.
+        let mut odometry = ContinuousOdometry::default();
+        odometry.follow(at(0.0), &pose(0.0, 0.0, 0.0));
+        odometry.follow(at(5.0), &pose(0.0, 0.0, 0.0));
+        odometry.follow(at(6.0), &pose(0.8, 0.0, 0.0));
+        odometry.follow(at(16.0), &pose(14.0, 0.0, 0.0));
+        assert_eq!(odometry.first_leap(), None);
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! One robot with its scans and poses.
 
 use super::continuous_odometry::ContinuousOdometry;
-use super::scan_odometry::ScanOdometry;
-use super::slam_map::{LostScans, SlamMap};
+use super::scan_odometry::{BlindDrive, ScanOdometry};
+use super::slam_map::{LostScans, LostWay, SlamMap};
 use super::{ScanBeams, ScanMap, ScanMapperParameters, TooLarge};
 use crate::shared::geometry::{Point2, Pose2, pose};
 use crate::shared::robot_clock::RobotClock;
@@ -13,6 +13,8 @@ use std::collections::VecDeque;
 
 /// Scans wait for a later pose for at most this long, seconds: poses are kept as long.
 const PATIENCE: f64 = 10.0;
+/// Standard deviations of the motion of a robot in a pause in which nothing shows it, metres and radians.
+const UNSEEN_MOTION: [f64; 2] = [0.5, 0.5];
 
 /// Source of the robot's poses.
 enum Localization {
@@ -149,9 +151,30 @@ impl Robot {
         self.slam_map().is_some()
     }
 
-    /// Pose in the map for a pose by odometry; `None` if the robot has other poses, or none yet.
+    /// Pose in the map for a pose by odometry; `None` if the robot has other poses, or none yet, or has lost its way.
     pub(super) fn in_map(&self, time: LogTime, odometry: &Pose2) -> Option<Pose2> {
-        self.slam_map().map(|slam| slam.in_map(time, odometry))
+        self.slam_map()?.in_map(time, odometry)
+    }
+
+    /// Length of its ways as a share of that by odometry, if its scans are registered along odometry.
+    pub(super) fn odometry_scale(&self) -> Option<f64> {
+        match &self.localization {
+            Localization::ByOdometry(slam) => Some(slam.odometry_scale()),
+            _ => None,
+        }
+    }
+
+    /// Seconds from the first scan to where it has lost its way, and the length of the pause before it.
+    pub(super) fn lost_way(&self) -> Option<(f64, f64)> {
+        let LostWay { time, pause } = self.slam_map()?.lost_way()?;
+        Some((time.seconds_since(self.first_scan?), pause))
+    }
+
+    /// Seconds from the first scan to the longest drive whose scans do not show how far it went, and its seconds.
+    pub(super) fn longest_blind(&self) -> Option<(f64, f64)> {
+        let Localization::ByScans(_, odometry) = &self.localization else { return None };
+        let BlindDrive { since, seconds } = odometry.longest_blind()?;
+        Some((since.seconds_since(self.first_scan?), seconds))
     }
 
     /// Starts to register scans, along odometry if there is any, once no poses came for long enough or none will come.
@@ -179,6 +202,10 @@ impl Robot {
     ) {
         if let Localization::ByScans(slam, odometry) = &mut self.localization {
             for (time, scan) in self.waiting.drain(..) {
+                if slam.lost_way().is_some() {
+                    continue;
+                }
+                let scan = without_motion(&scan, |delay| Some(odometry.motion(delay)));
                 let at = odometry.pose(time, &scan, slam);
                 self.kept_odometry.push((time, at));
                 let is_due = slam.is_due(time, &at, parameters);
@@ -223,7 +250,10 @@ impl Robot {
                     }
                     drawn
                 }
-                Localization::ByOdometry(slam) => add_to_slam(slam, &self.odometry, time, &scan, parameters),
+                Localization::ByOdometry(slam) => {
+                    let blind = self.continuous.blind_pause();
+                    add_to_slam(slam, &self.odometry, blind, (time, &scan), parameters)
+                }
             });
         }
     }
@@ -270,40 +300,47 @@ fn draw_by_poses(
     }
 }
 
+/// Adds a scan at its pose by odometry, where `blind` is the last pause in which nothing shows how the robot moved, with
+/// its length in seconds.
 fn add_to_slam(
     slam: &mut SlamMap,
     odometry: &PoseTrack,
-    time: LogTime,
-    scan: &ScanBeams,
+    blind: Option<(LogTime, f64)>,
+    (time, scan): (LogTime, &ScanBeams),
     parameters: &ScanMapperParameters,
 ) -> ScanOutcome {
+    if slam.lost_way().is_some() {
+        return ScanOutcome::Used;
+    }
     let Some(start) = pose_at(odometry, time, parameters) else { return ScanOutcome::NoPose };
+    // The relative poses of the beams of one scan are those of odometry.
+    let still =
+        || without_motion(scan, |delay| Some(start.inv_mul(&pose_at(odometry, time.plus_seconds(delay), parameters)?)));
+    let pause = blind.filter(|(end, _)| *end <= time && slam.last_time().is_some_and(|last| last < *end));
+    if let Some((end, pause)) = pause
+        && !slam.locate(&start, UNSEEN_MOTION, &still()).is_some_and(|located| located.is_sure)
+    {
+        slam.lose_way(end, pause);
+    }
     if !slam.is_due(time, &start, parameters) {
         return ScanOutcome::Used;
     }
-    // The relative poses of the beams of one scan are those of odometry.
-    let still = without_motion(odometry, time, scan, &start, parameters);
-    if slam.add(time, &start, &still) { ScanOutcome::Used } else { ScanOutcome::NotMatched }
+    if slam.add(time, &start, &still()) { ScanOutcome::Used } else { ScanOutcome::NotMatched }
 }
 
-/// The scan of a robot that stands still at `start`.
-fn without_motion(
-    odometry: &PoseTrack,
-    time: LogTime,
-    scan: &ScanBeams,
-    start: &Pose2,
-    parameters: &ScanMapperParameters,
-) -> ScanBeams {
+/// The scan of a robot that stands still where it is at the first beam; `moved(delay)` is where it really is that many
+/// seconds later, relative to there.
+fn without_motion(scan: &ScanBeams, moved: impl Fn(f64) -> Option<Pose2>) -> ScanBeams {
     let mut still = scan.clone();
     if scan.duration == 0.0 {
         return still;
     }
     let transform_lidar_base = scan.transform_base_lidar.inverse();
     for beam in &mut still.beams {
-        let Some(base) = pose_at(odometry, time.plus_seconds(beam.delay), parameters) else { continue };
+        let Some(base) = moved(beam.delay) else { continue };
         let (sine, cosine) = beam.angle.sin_cos();
         let end = Point2::new(cosine * beam.range, sine * beam.range);
-        let end = transform_lidar_base * (start.inverse() * (base * (scan.transform_base_lidar * end)));
+        let end = transform_lidar_base * (base * (scan.transform_base_lidar * end));
         (beam.angle, beam.range, beam.delay) = (end.y.atan2(end.x), end.coords.norm(), 0.0);
     }
     still.duration = 0.0;

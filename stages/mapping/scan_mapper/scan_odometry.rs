@@ -20,27 +20,67 @@ pub(super) struct ScanOdometry {
     last: Option<(LogTime, Pose2)>,
     /// Metres and radians per second, in the frame of the base.
     velocity: [f64; 3],
+    /// Start of the scans up to the last one that do not show the way along a corridor.
+    blind_since: Option<LogTime>,
+    longest_blind: Option<BlindDrive>,
+}
+
+/// Scans that do not show how far the robot goes along a corridor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct BlindDrive {
+    /// Time of the first of them.
+    pub(super) since: LogTime,
+    /// Time from it to the last, seconds.
+    pub(super) seconds: f64,
 }
 
 impl ScanOdometry {
-    /// The pose at a scan, in the frame of the first one.
-    pub(super) fn pose(&mut self, time: LogTime, scan: &ScanBeams, slam: &SlamMap) -> Pose2 {
+    /// The longest drive along a corridor whose walls do not show how far the robot goes.
+    pub(super) fn longest_blind(&self) -> Option<BlindDrive> {
+        self.longest_blind
+    }
+
+    /// The motion of the base in the seconds after a scan, at the velocity between the last two.
+    pub(super) fn motion(&self, seconds: f64) -> Pose2 {
+        let [x, y, turn] = self.velocity.map(|velocity| velocity * seconds.min(LONGEST_GAP));
+        pose(x, y, turn)
+    }
+
+    /// The pose at a scan, in the frame of the first one. After a pause the scan must lie on earlier ones, or the robot
+    /// has lost its way.
+    pub(super) fn pose(&mut self, time: LogTime, scan: &ScanBeams, slam: &mut SlamMap) -> Pose2 {
         let Some((before, last)) = self.last else {
             self.last = Some((time, Pose2::identity()));
             return Pose2::identity();
         };
         let gap = time.seconds_since(before).max(0.0);
-        let [x, y, turn] = self.velocity.map(|velocity| velocity * gap.min(LONGEST_GAP));
-        let guess = last * pose(x, y, turn);
+        let guess = last * self.motion(gap);
         let deviations =
             [0, 1].map(|axis| LEAST_DEVIATIONS[axis] + 0.5 * ACCELERATION[axis] * gap.min(LONGEST_GAP).powi(2));
+        let located = slam.locate(&guess, deviations, scan);
+        if gap > LONGEST_GAP && !located.is_some_and(|located| located.is_sure) {
+            slam.lose_way(time, gap);
+        }
+        self.note_blindness(before, time, located.is_some_and(|located| !located.shows_way));
         // Where the scan lies on no other one, the robot is taken to go on as it did.
-        let found = slam.locate(&guess, deviations, scan).unwrap_or(guess);
+        let found = located.map_or(guess, |located| located.pose);
         if gap > 0.0 {
             let moved = last.inv_mul(&found);
             self.velocity = [moved.translation.x, moved.translation.y, moved.rotation.angle()].map(|by| by / gap);
         }
         self.last = Some((time, found));
         found
+    }
+
+    fn note_blindness(&mut self, before: LogTime, time: LogTime, is_blind: bool) {
+        if !is_blind {
+            self.blind_since = None;
+            return;
+        }
+        let since = *self.blind_since.get_or_insert(before);
+        let blind = BlindDrive { since, seconds: time.seconds_since(since) };
+        if self.longest_blind.is_none_or(|longest| blind.seconds > longest.seconds) {
+            self.longest_blind = Some(blind);
+        }
     }
 }

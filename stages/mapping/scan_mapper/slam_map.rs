@@ -1,7 +1,7 @@
 //! The map of a robot that has odometry only, or nothing but scans: its poses are found by SLAM.
 
 use super::{BaseBeam, ScanBeams, ScanMap, ScanMapperParameters};
-use crate::mapping::slam::{ScanPoint, Trajectory, scan_points};
+use crate::mapping::slam::{LocatedScan, ScanPoint, Trajectory, scan_points};
 use crate::shared::geometry::{Point2, Pose2, pose, wrap_angle};
 use gridweave_runtime::message::LogTime;
 
@@ -35,6 +35,16 @@ pub(super) struct SlamMap {
     /// Number of scans in the map.
     drawn: usize,
     first_unmatched: Option<LogTime>,
+    lost_way: Option<LostWay>,
+}
+
+/// A pause in which nothing shows how the robot moved, and after which its scans lie on no earlier ones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LostWay {
+    /// End of the pause.
+    pub(super) time: LogTime,
+    /// Its length, seconds.
+    pub(super) pause: f64,
 }
 
 /// Scans that lie on no others.
@@ -56,18 +66,40 @@ impl SlamMap {
             map: ScanMap::new(parameters),
             drawn: 0,
             first_unmatched: None,
+            lost_way: None,
         }
     }
 
+    /// Leaves out all later scans: where they were made is not known.
+    pub(super) fn lose_way(&mut self, time: LogTime, pause: f64) {
+        self.lost_way.get_or_insert(LostWay { time, pause });
+    }
+
+    /// Where the robot has lost its way.
+    pub(super) fn lost_way(&self) -> Option<LostWay> {
+        self.lost_way
+    }
+
+    /// Length of the ways of the robot as a share of that by odometry.
+    pub(super) fn odometry_scale(&self) -> f64 {
+        self.trajectory.odometry_scale()
+    }
+
+    /// Time of the last scan.
+    pub(super) fn last_time(&self) -> Option<LogTime> {
+        self.scans.last().map(|scan| scan.time)
+    }
+
     /// Whether the robot has moved so far from the last scan, to the pose `odometry`, that another one is to be added.
-    /// Scans that are not later than the last are not.
+    /// Scans that are not later than the last are not, nor those of a robot that has lost its way.
     pub(super) fn is_due(&self, time: LogTime, odometry: &Pose2, parameters: &ScanMapperParameters) -> bool {
-        self.scans.last().is_none_or(|last| {
-            let moved = last.odometry.inv_mul(odometry);
-            let is_far = moved.translation.vector.norm() >= parameters.step
-                || moved.rotation.angle().abs() >= parameters.step_yaw;
-            time > last.time && is_far
-        })
+        self.lost_way.is_none()
+            && self.scans.last().is_none_or(|last| {
+                let moved = last.odometry.inv_mul(odometry);
+                let is_far = moved.translation.vector.norm() >= parameters.step
+                    || moved.rotation.angle().abs() >= parameters.step_yaw;
+                time > last.time && is_far
+            })
     }
 
     /// Adds a scan that was made at the pose `odometry`, without motion. Returns whether it lies on the earlier ones.
@@ -91,9 +123,10 @@ impl SlamMap {
 
     /// Registers a scan without adding it, from the pose `guess` with the given standard deviations of position and
     /// yaw. The pose in the frame of odometry; `None` if the scan lies on no earlier ones.
-    pub(super) fn locate(&self, guess: &Pose2, deviations: [f64; 2], scan: &ScanBeams) -> Option<Pose2> {
+    pub(super) fn locate(&self, guess: &Pose2, deviations: [f64; 2], scan: &ScanBeams) -> Option<LocatedScan> {
         let last = self.scans.last()?.odometry;
-        Some(last * self.trajectory.locate(&last.inv_mul(guess), deviations, &points(scan))?)
+        let found = self.trajectory.locate(&last.inv_mul(guess), deviations, &points(scan))?;
+        Some(LocatedScan { pose: last * found.pose, ..found })
     }
 
     /// Looks for the last loop closures, when there will be no more scans.
@@ -145,21 +178,25 @@ impl SlamMap {
     }
 
     /// Pose in the map for a pose by odometry at a time: relative to the scan before it, and with the difference
-    /// between odometry and registration up to the next one in proportion to the time.
-    pub(super) fn in_map(&self, time: LogTime, odometry: &Pose2) -> Pose2 {
+    /// between odometry and registration up to the next one in proportion to the time. `None` where the robot has lost
+    /// its way.
+    pub(super) fn in_map(&self, time: LogTime, odometry: &Pose2) -> Option<Pose2> {
+        if self.lost_way.is_some_and(|lost| time >= lost.time) {
+            return None;
+        }
         let next = self.scans.partition_point(|scan| scan.time <= time);
-        let Some(before) = next.checked_sub(1) else { return *odometry };
+        let Some(before) = next.checked_sub(1) else { return Some(*odometry) };
         let last = &self.scans[before];
         let moved = last.odometry.inv_mul(odometry);
         let start = self.pose(before);
-        let Some(after) = self.scans.get(next) else { return start * moved };
+        let Some(after) = self.scans.get(next) else { return Some(start * moved) };
         let by_odometry = last.odometry.inv_mul(&after.odometry);
         let registered = start.inv_mul(&self.pose(next));
         let share = time.seconds_since(last.time) / after.time.seconds_since(last.time);
         let off = registered.translation.vector - by_odometry.translation.vector;
         let turned = wrap_angle(registered.rotation.angle() - by_odometry.rotation.angle());
         let place = moved.translation.vector + off * share;
-        start * pose(place.x, place.y, moved.rotation.angle() + turned * share)
+        Some(start * pose(place.x, place.y, moved.rotation.angle() + turned * share))
     }
 
     /// Whether the scans turn against odometry, as those of a lidar that is mounted upside down.

@@ -101,3 +101,36 @@ fn a_robot_none_of_whose_scans_has_a_pose_is_reported() {
     let reasons = lost(&mut bench);
     assert!(reasons.len() == 1 && reasons[0].contains("there is no pose of it for their times"), "{reasons:?}");
 }
+
+#[test]
+fn odometry_whose_ways_are_too_long_is_corrected() {
+    let mut longer = Pose2::identity();
+    let poses: Vec<Pose2> = (0..300)
+        .map(|tick| {
+            let at = |tick: i32| truth(0.1 * f64::from(tick));
+            let moved = if tick == 0 { Pose2::identity() } else { at(tick - 1).inv_mul(&at(tick)) };
+            longer *= Pose2::from_parts((1.1 * moved.translation.vector).into(), moved.rotation);
+            truth(0.0) * longer
+        })
+        .collect();
+    let mut bench = drive(|seconds| poses[(10.0 * seconds).round() as usize], |scan| scan);
+    let drawn = measure(&bench.map(30.0).0.unwrap(), &Pose2::identity());
+    assert!(drawn.mean < CELL && drawn.greatest < 8.0 * CELL, "{} {}", drawn.mean, drawn.greatest);
+    assert!(warns(&mut bench, "% too long by its scans, and is corrected"), "{:?}", bench.0.warnings());
+}
+
+#[test]
+fn a_robot_that_is_elsewhere_after_a_pause_has_lost_its_way() {
+    let mut bench = Bench::new("mode = 'offline'");
+    for tick in 0..200 {
+        let seconds = 0.1 * f64::from(tick) + if tick < 100 { 0.0 } else { 5.0 };
+        // In a round shaft nothing is as it was.
+        let ranges = if tick < 100 { still_ranges(seconds) } else { vec![0.7; still_ranges(0.0).len()] };
+        bench.scan(seconds, &RangeScan { ranges, ..still(seconds) });
+    }
+    assert!(bench.map(30.0).0.is_some(), "what was before the pause stays");
+    let poses: Vec<PoseWithCovarianceStamped> = bench.0.take("pose").unwrap();
+    assert!(!poses.is_empty() && poses.iter().all(|pose| LogTime::from(pose.header.stamp) < at(10.0)));
+    let lost = "robot1 has lost its way 15.0 s after its first scan: nothing shows how it moved in the 5.1 s before";
+    assert!(warns(&mut bench, lost), "{:?}", bench.0.warnings());
+}

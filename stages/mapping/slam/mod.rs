@@ -30,4 +30,4 @@ pub use local_map::LocalMap;
 pub use odometry_noise::OdometryNoise;
 pub use pose_graph::{Constraint, PoseGraph};
 pub use scan_points::{ScanPoint, scan_points};
-pub use trajectory::Trajectory;
+pub use trajectory::{LocatedScan, Trajectory};

@@ -12,13 +12,20 @@ const HALF_LIFE: f64 = 50.0;
 /// Factor by which the deviation is assumed larger than the parameter, before the first step.
 const PRIOR_FACTOR: f64 = 1.5;
 
+/// Standard deviation of the scale of odometry before the first step: the radius of wheels is known to some percent.
+const SCALE_DEVIATION: f64 = 0.03;
+/// Standard deviation of the way between two scans as their walls show it, metres.
+const WAY_DEVIATION: f64 = 0.02;
+/// Largest difference of the scale of one step from the estimate: more is a slip, or a wrong registration.
+const MOST_DIFFERENCE: f64 = 0.3;
+
 /// Least root of the summed squares of the turns, radians, from which they show which way the scans turn, and the
 /// correlation of both turns below which they turn against odometry.
 const LEAST_TURNS: f64 = 1.0;
 const OPPOSITE: f64 = -0.5;
 
 /// How uncertain the steps of odometry are: standard deviations in proportion to the way and the turn, with factors
-/// that are estimated from the steps so far.
+/// that are estimated from the steps so far; and by which factor its ways are too long or too short.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OdometryNoise {
     share: f64,
@@ -27,13 +34,25 @@ pub struct OdometryNoise {
     squares: [f64; 2],
     /// Sums of the squared turns by odometry, of those as registered, and of their products.
     turns: [f64; 3],
+    /// Sums of the products of the ways by odometry and by walls, and of the squared ways by odometry, in variances.
+    ways: [f64; 2],
 }
 
 impl OdometryNoise {
     /// Noise of which nothing has been seen: `share` is the standard deviation as a share of the way and the turn.
     pub fn new(share: f64) -> Self {
         let squares = [PRIOR_STEPS * PRIOR_FACTOR * PRIOR_FACTOR; 2];
-        Self { share, steps: PRIOR_STEPS, squares, turns: [0.0; 3] }
+        Self { share, steps: PRIOR_STEPS, squares, turns: [0.0; 3], ways: [SCALE_DEVIATION.powi(-2); 2] }
+    }
+
+    /// Length of a way by the walls as a share of that by odometry.
+    pub fn scale(&self) -> f64 {
+        self.ways[0] / self.ways[1]
+    }
+
+    /// A step of odometry with its way in the scale of the walls.
+    pub fn corrected(&self, moved: &Pose2) -> Pose2 {
+        Pose2::from_parts((self.scale() * moved.translation.vector).into(), moved.rotation)
     }
 
     /// Standard deviations of a step, before any factor: of the position, metres, and of the yaw, radians.
@@ -62,10 +81,11 @@ impl OdometryNoise {
         by_odometry.sqrt() >= LEAST_TURNS && both < OPPOSITE * (by_odometry * registered).sqrt()
     }
 
-    /// Learns from a step by odometry and the same step as registered, with its covariance. A step that no wall
-    /// constrains is as odometry has it, but its covariance is that of odometry, so that it changes nothing
-    /// (expectation maximisation).
-    pub fn learn(&mut self, moved: &Pose2, registered: &Pose2, covariance: &Matrix3<f64>) {
+    /// Learns from a [corrected](Self::corrected) step and the same step as registered, with its covariance and what the
+    /// walls alone say about it, as an inverse covariance. A step that no wall constrains is as odometry has it, but its
+    /// covariance is that of odometry, so that it changes nothing (expectation maximisation).
+    pub fn learn(&mut self, moved: &Pose2, registered: &Pose2, covariance: &Matrix3<f64>, by_walls: &Matrix3<f64>) {
+        self.learn_scale(moved, registered, by_walls);
         let [position, yaw] = self.assumed(moved);
         let off = registered.translation.vector - moved.translation.vector;
         let turned = wrap_angle(registered.rotation.angle() - moved.rotation.angle());
@@ -78,6 +98,27 @@ impl OdometryNoise {
         self.squares[0] = keep * self.squares[0]
             + 0.5 * (off.norm_squared() + covariance.m11 + covariance.m22) / (position * position);
         self.squares[1] = keep * self.squares[1] + (turned * turned + covariance.m33) / (yaw * yaw);
+    }
+
+    /// Learns the scale by weighted least squares. The registered way is the mean of that by odometry and that by the
+    /// walls, weighted by their information: the part of the walls is taken out of it.
+    fn learn_scale(&mut self, moved: &Pose2, registered: &Pose2, by_walls: &Matrix3<f64>) {
+        let scale = self.scale();
+        let way = moved.translation.vector.norm();
+        if way == 0.0 {
+            return;
+        }
+        let along = moved.translation.vector / way;
+        let information = along.dot(&(by_walls.fixed_view::<2, 2>(0, 0) * along));
+        let share = information / (information + self.deviations(moved)[0].powi(-2));
+        let by_walls = along.dot(&registered.translation.vector) - (1.0 - share) * way;
+        // Written so that a value that is not a number fails it.
+        if (by_walls - share * way).abs() < MOST_DIFFERENCE * share * way {
+            let by_odometry = way / scale;
+            let weight = by_odometry / WAY_DEVIATION.powi(2);
+            self.ways[0] += weight * by_walls;
+            self.ways[1] += weight * share * by_odometry;
+        }
     }
 }
 
@@ -92,11 +133,33 @@ mod tests {
         let mut mirrored = right.clone();
         for step in 0..40 {
             let turn = if step % 3 == 0 { -0.2 } else { 0.3 };
-            right.learn(&pose(0.1, 0.0, turn), &pose(0.1, 0.0, turn + 0.1), &Matrix3::zeros());
-            mirrored.learn(&pose(0.1, 0.0, turn), &pose(0.1, 0.0, 0.02 - turn), &Matrix3::zeros());
+            right.learn(&pose(0.1, 0.0, turn), &pose(0.1, 0.0, turn + 0.1), &Matrix3::zeros(), &Matrix3::zeros());
+            mirrored.learn(&pose(0.1, 0.0, turn), &pose(0.1, 0.0, 0.02 - turn), &Matrix3::zeros(), &Matrix3::zeros());
             assert!(step > 10 || !mirrored.turns_against_scans(), "a few turns tell nothing");
         }
         assert!(mirrored.turns_against_scans() && !right.turns_against_scans());
+    }
+
+    #[test]
+    fn the_scale_becomes_that_of_the_walls_where_these_show_it() {
+        let mut noise = OdometryNoise::new(0.1);
+        let mut blind = noise.clone();
+        for step in 0..200 {
+            let moved = pose(0.2, 0.0, 0.0);
+            // The walls and odometry are as sure, and the registered way lies between both.
+            let corrected = noise.corrected(&moved);
+            let equal = Matrix3::identity() * noise.deviations(&corrected)[0].powi(-2);
+            let between = 0.5 * (corrected.translation.x + 0.2 * 0.9);
+            noise.learn(&corrected, &pose(between, 0.0, 0.0), &Matrix3::zeros(), &equal);
+            let across = Matrix3::from_diagonal(&Vector3::new(0.0, 1e4, 1e4));
+            let corrected = blind.corrected(&moved);
+            blind.learn(&corrected, &corrected, &Matrix3::zeros(), &across);
+            // A slip says nothing.
+            noise.learn(&noise.corrected(&moved), &Pose2::identity(), &Matrix3::zeros(), &(1e6 * equal));
+            assert!(step > 0 || noise.scale() > 0.98, "one step says little");
+        }
+        assert!((noise.scale() - 0.9).abs() < 0.01, "{}", noise.scale());
+        assert_eq!(blind.scale(), 1.0);
     }
 
     #[test]
@@ -106,7 +169,7 @@ mod tests {
         let before = noise.deviations(&moved);
         for step in 0..400 {
             let off = if step % 2 == 0 { 0.03 } else { -0.03 };
-            noise.learn(&moved, &pose(1.0 + off, off, off), &Matrix3::zeros());
+            noise.learn(&moved, &pose(1.0 + off, off, off), &Matrix3::zeros(), &Matrix3::zeros());
         }
         let after = noise.deviations(&moved);
         assert!(before[0] > 0.15 && before[1] > 0.15, "{before:?}");

@@ -17,7 +17,7 @@ const WINDOW: f64 = 3.0;
 const LEAST_WINDOW: [f64; 2] = [0.1, 0.05];
 const LARGEST_WINDOW: [f64; 2] = [2.0, 1.0];
 /// Share of the points on the map below which a wider window is tried: wheels may have slipped.
-const WELL_MATCHED: f64 = 0.6;
+pub(super) const WELL_MATCHED: f64 = 0.6;
 /// The wider window, at least, metres and radians.
 const SLIP_WINDOW: [f64; 2] = [0.5, 0.7];
 /// How much more of the points must match for a pose in the wider window.

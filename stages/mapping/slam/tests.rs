@@ -131,14 +131,15 @@ fn what_was_registered_can_be_located_without_adding_it() {
     let (walls, truth) = (walls(), drive());
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let mut trajectory = Trajectory::new(0.1);
-    assert_eq!(trajectory.locate(&Pose2::identity(), [0.1; 2], &[]), None);
+    assert!(trajectory.locate(&Pose2::identity(), [0.1; 2], &[]).is_none());
     for (step, at) in truth.iter().enumerate().take(4) {
         let moved = if step == 0 { Pose2::identity() } else { pose(STEP, 0.0, 0.0) };
         trajectory.add(&moved, scan(&walls, at, &mut random));
     }
     let at = truth[3] * pose(0.2, 0.05, 0.1);
     let found = trajectory.locate(&Pose2::identity(), [0.1; 2], &scan(&walls, &at, &mut random)).unwrap();
-    let off = found.inverse() * truth[3].inv_mul(&at);
+    assert!(found.is_sure && found.shows_way, "{found:?}");
+    let off = found.pose.inverse() * truth[3].inv_mul(&at);
     assert!(off.translation.vector.norm() < 0.02 && off.rotation.angle().abs() < 0.01, "{off}");
     assert_eq!(trajectory.poses().len(), 4);
 }

@@ -6,7 +6,7 @@ use super::odometry_noise::OdometryNoise;
 use super::pose_graph::{Constraint, PoseGraph, turned_information};
 use super::revisits::register_on_revisited;
 use super::scan_points::ScanPoint;
-use super::scan_registration::register;
+use super::scan_registration::{WELL_MATCHED, register};
 use crate::shared::geometry::Pose2;
 use nalgebra::{Matrix3, UnitComplex, Vector2, Vector3};
 use std::ops::Range;
@@ -29,6 +29,21 @@ const LEAST_MATCHED: f64 = 0.15;
 const REVISITED_DISTANCE: f64 = 10.0;
 const REVISITED_SUBMAPS: usize = 6;
 const REVISITED_DEVIATIONS: [f64; 2] = [0.15, 0.05];
+
+/// Information about the position along a corridor, as a share of that across it, up to which its walls do not show
+/// where the robot is: normals that are off by a seventh of a radian feign as much.
+const BLIND_SHARE: f64 = 0.02;
+
+/// A scan that was registered without being added.
+#[derive(Clone, Copy, Debug)]
+pub struct LocatedScan {
+    /// Pose of the base in its frame at the last scan.
+    pub pose: Pose2,
+    /// Whether most of its points lie on the map.
+    pub is_sure: bool,
+    /// Whether its walls show the position in all directions, which those of a bare corridor do not.
+    pub shows_way: bool,
+}
 
 /// The scans of a robot with their poses, in the frame of the first.
 #[derive(Clone, Debug)]
@@ -83,6 +98,11 @@ impl Trajectory {
         self.noise.turns_against_scans()
     }
 
+    /// Length of the ways of the robot as a share of that by odometry.
+    pub fn odometry_scale(&self) -> f64 {
+        self.noise.scale()
+    }
+
     /// Adds a scan of a robot that has moved by `moved` since the last one, by odometry. Returns whether a loop
     /// closure has moved earlier scans.
     pub fn add(&mut self, moved: &Pose2, points: Vec<ScanPoint>) -> bool {
@@ -90,6 +110,7 @@ impl Trajectory {
             self.push(Pose2::identity(), 0.0, points);
             return false;
         };
+        let moved = &self.noise.corrected(moved);
         let guess = last * moved;
         let by_odometry = self.noise.information(moved);
         let prior = turned_information(&by_odometry, &last.rotation);
@@ -104,7 +125,7 @@ impl Trajectory {
         let to = self.graph.poses.len();
         let transform = last.inv_mul(&pose);
         if let (true, Some(covariance)) = (is_matched, information.try_inverse()) {
-            self.noise.learn(moved, &transform, &covariance);
+            self.noise.learn(moved, &transform, &covariance, &by_walls);
         }
         self.graph.constraints.push(Constraint { from: to - 1, to, transform, information, is_loop: false });
         self.push(pose, moved.translation.vector.norm(), points);
@@ -115,13 +136,20 @@ impl Trajectory {
     /// Registers points on the local map, without adding them: the pose relative to the last scan, `guess` being what
     /// it is expected to be with these standard deviations of position and yaw. `None` if the points lie on no earlier
     /// ones.
-    pub fn locate(&self, guess: &Pose2, deviations: [f64; 2], points: &[ScanPoint]) -> Option<Pose2> {
+    pub fn locate(&self, guess: &Pose2, deviations: [f64; 2], points: &[ScanPoint]) -> Option<LocatedScan> {
         let last = self.graph.poses.last()?;
         let [place, yaw] = deviations.map(|deviation| deviation.powi(-2));
         let information = Matrix3::from_diagonal(&Vector3::new(place, place, yaw));
         let information = turned_information(&information, &last.rotation);
         let found = register(&self.local_map(), points, &(last * guess), &information, deviations);
-        (found.matched >= LEAST_MATCHED).then(|| last.inv_mul(&found.pose))
+        let place = found.information.fixed_view::<2, 2>(0, 0).into_owned();
+        let by_direction = place.symmetric_eigenvalues();
+        (found.matched >= LEAST_MATCHED).then(|| LocatedScan {
+            pose: last.inv_mul(&found.pose),
+            is_sure: found.matched >= WELL_MATCHED,
+            // Written so that a value that is not a number fails it.
+            shows_way: by_direction.min() > BLIND_SHARE * by_direction.max(),
+        })
     }
 
     fn push(&mut self, pose: Pose2, way: f64, points: Vec<ScanPoint>) {

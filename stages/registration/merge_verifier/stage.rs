@@ -57,7 +57,7 @@ pub(super) struct MergeVerifier {
     /// Self-similarity of maps that were accepted without tags.
     self_similarities: SelfSimilarities,
     sent: BTreeMap<RobotPair, Alignment>,
-    /// Size of map b of accepted pairs, as a share of its size by its resolution, where that is in doubt.
+    /// Size of map b under the deformation, as a share of its size by its resolution, where that is in doubt.
     other_scales: BTreeMap<RobotPair, f64>,
     /// Evidence that was sent last, without headers.
     evidence: BTreeMap<RobotPair, Evidence>,
@@ -130,7 +130,8 @@ impl MergeVerifier {
             self.send(&pair, alignment, output)?;
         }
         self.search_scales(output)?;
-        for (RobotPair { a, b }, scale) in &self.other_scales {
+        let is_accepted = |pair: &RobotPair| self.sent.get(pair).is_some_and(|alignment| alignment.accepted);
+        for (RobotPair { a, b }, scale) in self.other_scales.iter().filter(|(pair, _)| is_accepted(pair)) {
             output.warn(format!(
                 "{b} fits {a} if it is {scale:.2} times as large: are the resolutions of both maps right?"
             ));
@@ -145,8 +146,11 @@ impl MergeVerifier {
         let accepted: Vec<&RobotPair> =
             self.sent.iter().filter(|(_, alignment)| alignment.accepted).map(|(pair, _)| pair).collect();
         let is_alone = |robot: &str| !accepted.iter().any(|pair| pair.concerns(robot));
-        let is_improbable = |alignment: &Alignment| !alignment.accepted && alignment.score < LEAST_PROBABILITY;
-        let refused = self.sent.iter().filter(|(_, alignment)| is_improbable(alignment)).map(|(pair, _)| pair);
+        let is_doubted = |(pair, alignment): &(&RobotPair, &Alignment)| {
+            let is_improbable = alignment.score < LEAST_PROBABILITY || self.other_scales.contains_key(pair);
+            !alignment.accepted && is_improbable
+        };
+        let refused = self.sent.iter().filter(is_doubted).map(|(pair, _)| pair);
         let alone: Vec<RobotPair> = refused.filter(|pair| is_alone(&pair.a) || is_alone(&pair.b)).cloned().collect();
         if range == 0.0 || alone.len() > MOST_SCALED {
             return Ok(());
@@ -219,7 +223,7 @@ impl MergeVerifier {
         self.other_scales.remove(pair);
         let proposed = proposed(&self.hypotheses, pair);
         let Some(verdict) = verdict else { return self.send(pair, refused(&proposed), output) };
-        if let (Some(scale), None) = (verdict.other_scale(), &verdict.refusal) {
+        if let Some(scale) = verdict.other_scale() {
             self.other_scales.insert(pair.clone(), scale);
         }
         let evidence = evidence(verdict, pair, proposed.len());
