@@ -1,13 +1,12 @@
 //! The papers' experiments repeated, and how far the stages hold:
 //!
-//!     cargo run --release -p gridweave-tests --bin experiments -- align --help
+//!     cargo run --release -p gridweave-tests --bin experiments -- map-pairs --help
 //!
 //! Each experiment is a file or a folder here. It prints its tables and writes them as CSV, and its curves as SVG, to a
 //! folder. Everything but the times is the same on every machine: an experiment's trials are seeded one by one.
 
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
-mod align;
 mod cut;
 mod direction;
 mod edges;
@@ -54,8 +53,6 @@ enum Experiment {
     FewTags(few_tags::FewTagsArgs),
     /// Robots without maps whose odometry drifts, merged by the tags that they read.
     TagSlam(tag_slam::TagSlamArgs),
-    /// Map-only merges: random pairs, pairs of two buildings, self-similar buildings, and many robots.
-    Align(align::AlignArgs),
     /// Merging pairs of map files by the maps alone: pairs with a truth, and thousands of different buildings.
     MapPairs(map_pairs::MapPairsArgs),
     /// Fits the weights of the judgement to pairs of maps, cross-validated by place, and writes them.
@@ -80,7 +77,6 @@ fn main() -> Result<()> {
         Experiment::Localization(args) => localization::run(args, &mut results),
         Experiment::FewTags(args) => few_tags::run(args, &registry, &mut results),
         Experiment::TagSlam(args) => tag_slam::run(args, &registry, &mut results),
-        Experiment::Align(args) => align::run(args, &registry, &mut results),
         Experiment::MapPairs(args) => map_pairs::run(args, &registry, &mut results),
         Experiment::FitJudgement(args) => judgement::run(args, &registry, &mut results),
         Experiment::Radon(args) => radon::run(args, &mut results),

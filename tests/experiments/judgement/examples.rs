@@ -1,11 +1,11 @@
 //! What the weights are fitted to.
 
 use super::FitJudgementArgs;
-use crate::align::kinds::Kind;
-use crate::align::worlds::Seeds;
 use crate::map_pairs::judging::candidates_of;
+use crate::map_pairs::kinds::Kind;
 use crate::map_pairs::library::{self, Library, MapOfBuilding, SimulatedPair};
 use crate::map_pairs::truth::{self, Closeness};
+use crate::map_pairs::worlds::Seeds;
 use anyhow::{Context, Result};
 use gridweave_runtime::stage::Registry;
 use gridweave_stages::registration::judgement::{Alias, COUNT, Candidate};
@@ -144,7 +144,7 @@ pub(super) fn gather(args: &FitJudgementArgs, registry: &Registry) -> Result<Vec
     }
     let example = |pair: &SimulatedPair| {
         let [a, b] = &pair.maps;
-        let set = pair.world.kind.map_or_else(String::new, set_of);
+        let set = set_of(pair.world.kind);
         let names = [set.as_str(), pair.world.name.as_str(), a.building.as_str()];
         Example::new(names, true, candidates_of(a, b, LIKELY), |place| pair.closeness(place))
     };

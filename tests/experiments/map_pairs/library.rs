@@ -1,7 +1,7 @@
 //! Maps of many buildings, and parts of them.
 
-use crate::align::kinds::Kind;
-use crate::align::worlds::{self, PairWorld, Seeds};
+use super::kinds::Kind;
+use super::worlds::{self, PairWorld, Seeds};
 use crate::log::last_maps;
 use crate::map_pairs::truth::Closeness;
 use anyhow::{Context, Result};
@@ -192,7 +192,7 @@ impl SimulatedPair {
 
     /// The kind of building.
     pub(crate) fn kind(&self) -> &'static str {
-        self.world.kind.map_or("", Kind::name)
+        self.world.kind.name()
     }
 
     /// How near `T_a_b` is to the truth.

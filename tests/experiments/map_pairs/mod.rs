@@ -8,10 +8,11 @@
 //! No log is written, so that thousands of pairs are done in an hour.
 
 pub(crate) mod judging;
+pub(crate) mod kinds;
 pub(crate) mod library;
 pub(crate) mod truth;
+pub(crate) mod worlds;
 
-use super::align::worlds::Seeds;
 use super::results::Results;
 use anyhow::{Result, bail};
 use clap::Args;
@@ -23,6 +24,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::path::PathBuf;
+use worlds::Seeds;
 
 /// Arguments of the experiment `map-pairs`.
 #[derive(Debug, Args)]
@@ -37,7 +39,8 @@ pub(super) struct MapPairsArgs {
     /// Simulated worlds of any kind: the maps of both robots, and with those of other worlds.
     #[arg(long, default_value_t = 0)]
     worlds: u64,
-    /// Simulated worlds of this kind only, as `align` calls it: flats, symmetric, ...
+    /// Simulated worlds of this kind only: flats, offices, corridors, halls, warehouses, campuses, symmetric, repeated
+    /// rooms.
     #[arg(long)]
     kind: Option<String>,
     /// Use the simulated worlds on which parameters were chosen.
