@@ -55,6 +55,17 @@ pub fn resolve(path: &Path) -> io::Result<PathBuf> {
     Ok(folder_of(path).canonicalize()?.join(name))
 }
 
+/// Whether two paths name the same file, which may not exist.
+pub fn is_same_name(one: &Path, other: &Path) -> bool {
+    matches!((resolve(one), resolve(other)), (Ok(one), Ok(other)) if one == other || is_same_file(&one, &other))
+}
+
+/// Whether two paths lead to the same file.
+pub fn is_same_file(one: &Path, other: &Path) -> bool {
+    let (Ok(one), Ok(other)) = (one.metadata(), other.metadata()) else { return false };
+    (one.dev(), one.ino()) == (other.dev(), other.ino())
+}
+
 /// The folder of a file.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))

@@ -1,11 +1,10 @@
 //! The file of a trace of the work of the stages. It is written as a part beside it, which takes its name when the
 //! command has ended.
 
-use crate::job::is_same_name;
 use crate::status::BadUse;
 use crate::terminal::eprint_line;
 use anyhow::{Context, Result};
-use gridweave_logs::file::OutputFile;
+use gridweave_logs::file::{OutputFile, is_same_name};
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::io::{self, Write};

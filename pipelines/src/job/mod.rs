@@ -14,7 +14,7 @@ mod view;
 pub(crate) use inputs::{Inputs, is_yaml};
 pub(crate) use options::RunOptions;
 pub(crate) use outputs::check as check_outputs;
-pub(crate) use outputs::{check_ending, check_is_no_input, check_mcap_ending, is_same_name};
+pub(crate) use outputs::{check_ending, check_is_no_input, check_mcap_ending};
 pub(crate) use placing::Outputs;
 pub(crate) use reading::{NamingOptions, ReadingOptions};
 pub(crate) use view::STANDARD_VIEW;

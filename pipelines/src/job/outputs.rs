@@ -5,7 +5,7 @@ use super::options::RunOptions;
 use crate::status::BadUse;
 use crate::trace;
 use anyhow::{Result, bail};
-use gridweave_logs::file::{check_writable, resolve};
+use gridweave_logs::file::{check_writable, is_same_file, is_same_name};
 use gridweave_logs::map_file;
 use gridweave_logs::names::Input;
 use gridweave_logs::sink::is_ros1_bag;
@@ -196,24 +196,7 @@ pub(super) fn files_of(pipeline: &Pipeline, kind: &str, parameter: &str) -> Vec<
 /// Whether two paths lead to the same file, or the first to a folder that contains the second, also through links.
 fn is_or_holds(input: &Path, output: &Path) -> bool {
     let (Ok(input), Ok(output)) = (input.canonicalize(), output.canonicalize()) else { return false };
-    output.starts_with(&input) || same_file(&input, &output)
-}
-
-/// Whether two paths name the same file, which may not exist.
-pub(crate) fn is_same_name(one: &Path, other: &Path) -> bool {
-    matches!((resolve(one), resolve(other)), (Ok(one), Ok(other)) if one == other || same_file(&one, &other))
-}
-
-#[cfg(unix)]
-fn same_file(a: &Path, b: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    let (Ok(a), Ok(b)) = (a.metadata(), b.metadata()) else { return false };
-    (a.dev(), a.ino()) == (b.dev(), b.ino())
-}
-
-#[cfg(not(unix))]
-fn same_file(a: &Path, b: &Path) -> bool {
-    a == b
+    output.starts_with(&input) || is_same_file(&input, &output)
 }
 
 #[cfg(test)]
