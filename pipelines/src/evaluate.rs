@@ -155,24 +155,14 @@ fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
             let metres = (found * Point2::new(x, y) - expected * Point2::new(x, y)).norm();
             (metres, (expected.inverse() * found).rotation.angle().abs().to_degrees())
         });
-        let outcome = match (found, errors) {
-            (Some(_), Some((metres, degrees))) if metres < RIGHT_METRES && degrees < RIGHT_DEGREES => {
-                RobotOutcome::Right
-            }
-            (Some(_), Some(_)) => RobotOutcome::Wrong,
-            (Some(_), None) if related => RobotOutcome::NoTruth,
-            (Some(_), None) => RobotOutcome::Wrong,
-            (None, _) if expected.is_some() => RobotOutcome::Refused,
-            (None, _) if related => RobotOutcome::NoTruth,
-            (None, _) => RobotOutcome::RightlyRefused,
-        };
+        let is_near = errors.map(|(metres, degrees)| metres < RIGHT_METRES && degrees < RIGHT_DEGREES);
         let reason = match found {
             Some(_) => None,
             None => Some(run.unmerged.get(*robot).cloned().unwrap_or_else(|| "it is not in the summary".into())),
         };
         RobotResult {
             robot: (*robot).clone(),
-            outcome,
+            outcome: RobotOutcome::of(found.is_some(), expected.is_some(), is_near, related),
             error_m: errors.map(|(metres, _)| metres),
             error_deg: errors.map(|(_, degrees)| degrees),
             normalised_error_squared: frame
@@ -199,6 +189,20 @@ fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
 }
 
 impl RobotOutcome {
+    /// The outcome of a robot that `is_merged` or not, and is in the truth or not. `is_near` is whether its pose is near
+    /// the true one, `None` if they cannot be compared. `related` is whether the truth relates the robots.
+    fn of(is_merged: bool, is_in_truth: bool, is_near: Option<bool>, related: bool) -> Self {
+        match (is_merged, is_near) {
+            (true, Some(true)) => Self::Right,
+            (true, Some(false)) => Self::Wrong,
+            (true, None) if related => Self::NoTruth,
+            (true, None) => Self::Wrong,
+            (false, _) if is_in_truth => Self::Refused,
+            (false, _) if related => Self::NoTruth,
+            (false, _) => Self::RightlyRefused,
+        }
+    }
+
     /// The outcome as text.
     pub fn words(self) -> &'static str {
         match self {

@@ -165,3 +165,20 @@ right 1, wrong 0, refused 1 (reference robot1)
 ";
     assert_eq!(text, expected);
 }
+
+#[test]
+fn the_outcome_follows_from_the_merge_the_truth_and_the_error() {
+    // Whether the robot is merged, whether it is in the truth, whether it is near, and the outcome among related robots
+    // and among unrelated ones.
+    use RobotOutcome::{NoTruth, Refused, Right, RightlyRefused, Wrong};
+    for (is_merged, is_in_truth, is_near, among_related, among_unrelated) in [
+        (true, true, Some(true), Right, Right),
+        (true, true, Some(false), Wrong, Wrong),
+        (true, false, None, NoTruth, Wrong),
+        (false, true, None, Refused, Refused),
+        (false, false, None, NoTruth, RightlyRefused),
+    ] {
+        let outcomes = [true, false].map(|related| RobotOutcome::of(is_merged, is_in_truth, is_near, related));
+        assert_eq!(outcomes, [among_related, among_unrelated], "{is_merged} {is_in_truth} {is_near:?}");
+    }
+}
