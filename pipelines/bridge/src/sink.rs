@@ -9,6 +9,7 @@ use super::sender::{Sender, Settings};
 use super::wire::Link;
 use gridweave_runtime::message::{Channel, FixedText, Message};
 use gridweave_runtime::ros::{OccupancyGrid, RosMessage, encode};
+use gridweave_runtime::stage::bridge_counts;
 use gridweave_runtime::stage::{Context, Output, ParameterError, Parameters, StageError, StageKind, frame_of_robot};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -240,7 +241,7 @@ impl BridgeSink {
             let text = format!("the other end of the bridge has not acknowledged the end within {seconds} s");
             tracing::warn!("{text}; {messages} messages were not acknowledged");
             output.warn_logged(text);
-            output.count("messages that were not acknowledged before the end", messages as u64);
+            output.count(bridge_counts::UNACKNOWLEDGED, messages as u64);
         }
         Ok(())
     }
@@ -252,10 +253,10 @@ impl BridgeSink {
         for (what, more) in [
             ("messages taken by the other end", now.sent - before.sent),
             ("batches", now.batches - before.batches),
-            ("bytes sent", now.bytes - before.bytes),
+            (bridge_counts::BYTES_SENT, now.bytes - before.bytes),
             ("bytes of the messages in them", now.message_bytes - before.message_bytes),
-            ("messages dropped because the bridge does not keep up", now.dropped - before.dropped),
-            ("messages superseded by the last of their topic", now.superseded - before.superseded),
+            (bridge_counts::DROPPED, now.dropped - before.dropped),
+            (bridge_counts::SUPERSEDED, now.superseded - before.superseded),
         ] {
             if more > 0 {
                 output.count(what, more);

@@ -42,6 +42,7 @@
 //! is seeded from [`Context::seed`]. A message that it sends carries the log time of the message that caused it.
 //! Therefore the same inputs give the same outputs on every engine.
 
+pub mod bridge_counts;
 mod builder;
 mod context;
 mod error;

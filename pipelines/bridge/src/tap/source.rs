@@ -9,6 +9,7 @@ use super::requests::{Link, Passed};
 use gridweave_runtime::message::{Channel, MessageHeader};
 use gridweave_runtime::stage::{
     AnyMessage, Context, Out, Output, OutputPorts, Outputs, ParameterError, Parameters, Source, StageError, StageKind,
+    bridge_counts,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -181,7 +182,7 @@ impl Source for BridgeTap {
             Ok(Event::Found(link)) => self.link = link,
             Ok(Event::Passed(passed)) => passed.into_iter().try_for_each(|passed| self.send(passed, output))?,
             Ok(Event::Missed(messages)) => {
-                output.count("messages missed", messages);
+                output.count(bridge_counts::MISSED, messages);
                 output.warn("messages were missed, because the tap was too slow");
             }
             Ok(Event::Notice(text)) => {

@@ -1,9 +1,9 @@
 //! `gridweave bridge`: forwards links of a run to a run on another machine.
 
+use super::MESSAGE_INTERVAL;
 use super::bridge_settings::{bridge_kind, check, connect_parameters, settings};
-use super::link_choice::named_links;
+use super::link_choice::{Link, named_links};
 use super::running::{RunChoice, find_run};
-use super::tap::LOOK_INTERVAL;
 use crate::interrupt::stop_on_interrupt;
 use crate::status::Status;
 use crate::terminal::{eprint_line, print_line};
@@ -11,7 +11,9 @@ use anyhow::{Result, bail};
 use clap::Args;
 use gridweave_runtime::engine::{WatchedLink, watch_links, watch_statistics};
 use gridweave_runtime::message::{Channel, Message, MessageFlags};
-use gridweave_runtime::stage::{Context, InputWire, Registry};
+use gridweave_runtime::pipeline::Pipeline;
+use gridweave_runtime::stage::{Context, InputWire, Node, Registry, StageKind, bridge_counts};
+use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 use std::thread;
 
@@ -41,41 +43,69 @@ pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
     parameters.extend(settings(&args.set)?);
     check(kind, &parameters)?;
     let running = find_run(&args.run, registry)?;
-    let mut links = Vec::new();
-    for name in &args.links {
-        links.extend(named_links(name, &running.pipeline)?);
-    }
-    links.sort_by_key(|link| (link.stage, link.port));
-    links.dedup();
-    let port = kind.inputs.first().map_or("", |input| input.name);
-    let wires = links.iter().map(|link| {
-        let stage = &running.pipeline.stages[link.stage];
-        let output = &stage.kind.outputs[link.port];
-        let ros_type = output.port_type.name().to_owned();
-        let definition = stage.kind.definition(&ros_type).unwrap_or_default().to_owned();
-        InputWire { port, from: stage.name.clone(), output: output.name, ros_type, definition, ..Default::default() }
-    });
+    let links = chosen_links(&args.links, &running.pipeline)?;
     let context = Context {
         stage: "bridge".to_owned(),
-        inputs: wires.collect(),
+        inputs: wires(&links, &running.pipeline, kind),
         statistics: Some(watch_statistics(&running.run, &running.pipeline)?),
         links: Some(watch_links(&running.run, &running.pipeline)),
         ..Default::default()
     };
     let stop = stop_on_interrupt("messages in the queues are sent");
     let mut sink = kind.make(parameters, &context, Vec::new())?;
-    let open =
-        |link: &super::link_choice::Link| WatchedLink::open(&running.run, &running.pipeline, link.stage, link.port);
+    let open = |link: &Link| WatchedLink::open(&running.run, &running.pipeline, link.stage, link.port);
     let mut watched = links.iter().map(open).collect::<Result<Vec<_>, _>>()?;
     eprint_line(format_args!(
         "carries {} links of {}; ctrl-c ends the bridge, not the run",
         links.len(),
         running.name()
     ));
-    let mut messages = 0u64;
+    let is_over = || stop.load(Ordering::Relaxed) || !running.run.is_running();
+    let messages = carry(&mut watched, &mut sink, is_over)?;
+    sink.finish()?;
+    for (warning, count) in sink.warnings() {
+        eprint_line(format_args!("warning: {warning} ({count} times)"));
+    }
+    let lost = lost(&sink.counts());
+    let (carried, bytes) = (messages.saturating_sub(lost), count(&sink.counts(), bridge_counts::BYTES_SENT));
+    print_line(format_args!("carried {carried} of {messages} messages of {} links, in {bytes} bytes", links.len()))?;
+    let missed: u64 = watched.iter().map(WatchedLink::missed).sum();
+    if missed > 0 {
+        bail!("{missed} messages were missed: the bridge was too slow");
+    }
+    Ok(if lost > 0 { Status::Failed } else { Status::Done })
+}
+
+/// The links of these names, each once.
+fn chosen_links(names: &[String], pipeline: &Pipeline) -> Result<Vec<Link>> {
+    let mut links = Vec::new();
+    for name in names {
+        links.extend(named_links(name, pipeline)?);
+    }
+    links.sort_by_key(|link| (link.stage, link.port));
+    links.dedup();
+    Ok(links)
+}
+
+/// The inputs of the bridge, one for each link.
+fn wires(links: &[Link], pipeline: &Pipeline, kind: &StageKind) -> Vec<InputWire> {
+    let port = kind.inputs.first().map_or("", |input| input.name);
+    let wire = |link: &Link| {
+        let stage = &pipeline.stages[link.stage];
+        let output = &stage.kind.outputs[link.port];
+        let ros_type = output.port_type.name().to_owned();
+        let definition = stage.kind.definition(&ros_type).unwrap_or_default().to_owned();
+        InputWire { port, from: stage.name.clone(), output: output.name, ros_type, definition, ..Default::default() }
+    };
+    links.iter().map(wire).collect()
+}
+
+/// Sends the messages of the links, until `is_over`. Returns the number of messages.
+fn carry(watched: &mut [WatchedLink], sink: &mut Node, is_over: impl Fn() -> bool) -> Result<u64> {
+    let mut messages = 0;
     loop {
         // Messages that were sent before the end of the run can be read after it.
-        let is_last_look = stop.load(Ordering::Relaxed) || !running.run.is_running();
+        let is_last_look = is_over();
         for (wire, link) in watched.iter_mut().enumerate() {
             let mut passed: Vec<Message> = Vec::new();
             link.take(|_, message| passed.push(message))?;
@@ -91,27 +121,23 @@ pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
             }
         }
         if is_last_look {
-            break;
+            return Ok(messages);
         }
-        thread::sleep(LOOK_INTERVAL);
+        thread::sleep(MESSAGE_INTERVAL);
     }
-    sink.finish()?;
-    for (warning, count) in sink.warnings() {
-        eprint_line(format_args!("warning: {warning} ({count} times)"));
-    }
-    let counts = sink.counts();
-    let count = |what: &str| counts.get(what).copied().unwrap_or_default();
-    // Messages taken do not count: a receiver that was restarted takes the retained messages once more.
-    let lost = count("messages that were not acknowledged before the end")
-        + count("messages dropped because the bridge does not keep up")
-        + count("messages superseded by the last of their topic");
-    let (carried, bytes) = (messages.saturating_sub(lost), count("bytes sent"));
-    print_line(format_args!("carried {carried} of {messages} messages of {} links, in {bytes} bytes", links.len()))?;
-    let missed: u64 = watched.iter().map(WatchedLink::missed).sum();
-    if missed > 0 {
-        bail!("{missed} messages were missed: the bridge was too slow");
-    }
-    Ok(if lost > 0 { Status::Failed } else { Status::Done })
+}
+
+fn count(counts: &BTreeMap<String, u64>, what: &str) -> u64 {
+    counts.get(what).copied().unwrap_or_default()
+}
+
+/// The number of messages that did not arrive. Those taken by the other end do not show that: a receiver that was restarted
+/// takes the retained messages once more.
+fn lost(counts: &BTreeMap<String, u64>) -> u64 {
+    [bridge_counts::UNACKNOWLEDGED, bridge_counts::DROPPED, bridge_counts::SUPERSEDED]
+        .map(|what| count(counts, what))
+        .iter()
+        .sum()
 }
 
 #[cfg(test)]

@@ -21,3 +21,10 @@ pub(crate) use record::{RecordArgs, record};
 pub(crate) use tap::{TapArgs, tap};
 pub(crate) use top::{TopArgs, top};
 pub(crate) use view::{ViewArgs, view};
+
+use std::time::Duration;
+
+/// The interval at which messages of a run in progress are read.
+const MESSAGE_INTERVAL: Duration = Duration::from_millis(5);
+/// The interval at which interrupts are checked.
+const INTERRUPT_INTERVAL: Duration = Duration::from_millis(20);

@@ -1,6 +1,6 @@
 //! The pace of `gridweave play`: each message is sent at its time.
 
-use super::play::LOOK_INTERVAL;
+use super::INTERRUPT_INTERVAL;
 use gridweave_logs::schemas::schema_text;
 use gridweave_runtime::message::{LogTime, MessageFlags, MessageHeader, Write};
 use gridweave_runtime::stage::{OutputSink, StageError};
@@ -56,7 +56,7 @@ impl Pace {
             let at = start + after.unwrap_or(Duration::MAX / 4);
             while let Some(left) = at.checked_duration_since(Instant::now()).filter(|left| !left.is_zero()) {
                 self.check()?;
-                thread::sleep(left.min(LOOK_INTERVAL));
+                thread::sleep(left.min(INTERRUPT_INTERVAL));
             }
         }
         self.check()

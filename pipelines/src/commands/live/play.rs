@@ -1,5 +1,6 @@
 //! `gridweave play`: sends the messages of logs to a live pipeline at the pace at which they were logged.
 
+use super::INTERRUPT_INTERVAL;
 use super::pace::{Pace, Paced, begins_with_header};
 use super::running::{RunChoice, Running, find_run};
 use crate::interrupt::stop_on_interrupt;
@@ -47,8 +48,6 @@ pub(crate) struct PlayArgs {
 const SOURCE: &str = "mcap_source";
 /// Timeout for the stages of the run to connect, and to take the last messages.
 const READY_TIMEOUT: Duration = Duration::from_secs(10);
-/// While it waits, the player checks for an interrupt at this interval.
-pub(super) const LOOK_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Plays logs.
 pub(crate) fn play(args: &PlayArgs, registry: &Registry) -> Result<Status> {
@@ -125,7 +124,7 @@ fn watch_while<T>(
                     stopped.store(true, Ordering::Relaxed);
                     sender.stop();
                 }
-                thread::sleep(LOOK_INTERVAL);
+                thread::sleep(INTERRUPT_INTERVAL);
             }
         };
         thread::Builder::new().spawn_scoped(scope, watch)?;

@@ -1,8 +1,8 @@
 //! `gridweave record`: writes the messages of links of a run to a log.
 
+use super::MESSAGE_INTERVAL;
 use super::link_choice::{Link, all_links, named_links};
 use super::running::{RunChoice, Running, find_run};
-use super::tap::LOOK_INTERVAL;
 use crate::interrupt::stop_on_interrupt;
 use crate::job::check_mcap_ending;
 use crate::status::Status;
@@ -70,7 +70,7 @@ pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
             writer.flush()?;
             flushed = Instant::now();
         }
-        thread::sleep(LOOK_INTERVAL);
+        thread::sleep(MESSAGE_INTERVAL);
     }
     let missed: u64 = recorders.iter().map(|recorder| recorder.link.missed()).sum();
     let untyped: u64 = recorders.iter().map(|recorder| recorder.channels.untyped).sum();

@@ -21,7 +21,7 @@ pub(crate) struct RunChoice {
 }
 
 /// Interval of the search for a run.
-const LOOK_INTERVAL: Duration = Duration::from_millis(50);
+const SEARCH_INTERVAL: Duration = Duration::from_millis(50);
 
 /// A run in progress and its pipeline.
 pub(super) struct Running {
@@ -70,10 +70,12 @@ pub(super) fn find_run_with(
         }
         match (runs.len(), runs.pop()) {
             (1, Some(running)) => return Ok(running),
-            (0, _) if start.elapsed().as_secs_f64() < choice.wait => thread::sleep(LOOK_INTERVAL),
+            (0, _) if start.elapsed().as_secs_f64() < choice.wait => thread::sleep(SEARCH_INTERVAL),
             (0, _) => match (&choice.run, in_progress.is_empty()) {
                 (Some(name), false) => bail!("no run {name} is in progress; there are {in_progress}"),
-                _ => bail!("no run of processes is in progress: start one with `gridweave run live`"),
+                _ => bail!(
+                    "no run with the engine `processes` is in progress: start one with `gridweave run live_merge`"
+                ),
             },
             _ => {
                 return Err(

@@ -1,5 +1,6 @@
 //! `gridweave tap`: prints the messages of a link.
 
+use super::MESSAGE_INTERVAL;
 use super::link_choice::named_link;
 use super::message_printer::{Printer, PrintingOptions, Types};
 use super::running::{RunChoice, find_run};
@@ -13,7 +14,6 @@ use gridweave_runtime::engine::WatchedLink;
 use gridweave_runtime::stage::Registry;
 use std::sync::atomic::Ordering;
 use std::thread;
-use std::time::Duration;
 
 /// Arguments of `gridweave tap`.
 #[derive(Debug, Args)]
@@ -29,9 +29,6 @@ pub(crate) struct TapArgs {
     #[command(flatten)]
     pub(crate) run: RunChoice,
 }
-
-/// Interval at which messages are read.
-pub(super) const LOOK_INTERVAL: Duration = Duration::from_millis(5);
 
 /// Prints messages until the run ends, the count is reached, or the user interrupts it.
 pub(crate) fn tap(args: &TapArgs, registry: &Registry) -> Result<Status> {
@@ -55,7 +52,7 @@ pub(crate) fn tap(args: &TapArgs, registry: &Registry) -> Result<Status> {
         if !printer.print()? || is_last_look {
             break;
         }
-        thread::sleep(LOOK_INTERVAL);
+        thread::sleep(MESSAGE_INTERVAL);
     }
     if watched.missed() > 0 {
         eprint_line(format_args!("{} messages were missed: this program was too slow", watched.missed()));

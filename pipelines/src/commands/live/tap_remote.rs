@@ -3,6 +3,7 @@
 //! The stage `bridge_tap` receives them. It connects to the same endpoint as the bridge of that machine: by default,
 //! the one on which the `bridge_source` of a run on this machine listens.
 
+use super::INTERRUPT_INTERVAL;
 use super::bridge_settings::{bridge_kind, check, connect_parameters, settings};
 use super::message_printer::{Printer, PrintingOptions, Types};
 use super::running::{RunChoice, Running, find_run_with};
@@ -12,17 +13,12 @@ use crate::terminal::eprint_line;
 use anyhow::{Context as _, Result};
 use clap::Args;
 use gridweave_runtime::pipeline::{Pipeline, StageSpec};
-use gridweave_runtime::stage::{Context, Registry, StageError, StageHarness};
+use gridweave_runtime::stage::{Context, Registry, StageError, StageHarness, bridge_counts};
 use std::sync::atomic::Ordering;
-use std::time::Duration;
 
 /// The kinds of the stage that receives the messages, and of the one that machines connect to.
 const TAP: &str = "bridge_tap";
 const SOURCE: &str = "bridge_source";
-/// The stage's count of messages that it was too slow for.
-const MISSED: &str = "messages missed";
-/// Interval at which interrupts are checked.
-const LOOK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// The connection to a run on another machine.
 #[derive(Debug, Args)]
@@ -78,7 +74,7 @@ pub(super) fn tap_remote(
     loop {
         let base_has_ended = base.as_ref().is_some_and(|base| !base.run.is_running());
         let is_last_look = stop.load(Ordering::Relaxed) || base_has_ended;
-        stage.node().wait(LOOK_INTERVAL);
+        stage.node().wait(INTERRUPT_INTERVAL);
         let goes_on = stage.node().advance().map_err(bad_use)?;
         stage.take_messages(output).iter().for_each(|message| printer.add(message));
         if base_has_ended && goes_on {
@@ -88,7 +84,7 @@ pub(super) fn tap_remote(
             break;
         }
     }
-    if let Some(missed) = stage.counts().get(MISSED) {
+    if let Some(missed) = stage.counts().get(bridge_counts::MISSED) {
         eprint_line(format_args!(
             "{missed} messages were missed: this program, or the connection to the machine, was too slow"
         ));

@@ -1,5 +1,6 @@
 //! `gridweave top`: shows rates, queues and latencies of the stages of a run, redrawn in place.
 
+use super::INTERRUPT_INTERVAL;
 use super::other_machines::{Machine, OtherMachines};
 use super::running::{RunChoice, Running, find_run};
 use crate::interrupt::stop_on_interrupt;
@@ -36,9 +37,6 @@ pub(crate) struct TopArgs {
     pub(crate) run: RunChoice,
 }
 
-/// Interval at which interrupts are checked.
-const LOOK_INTERVAL: Duration = Duration::from_millis(20);
-
 /// Shows the stages until the run ends or the user interrupts it.
 pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
     let interval = Duration::try_from_secs_f64(args.interval).ok().filter(|interval| !interval.is_zero());
@@ -52,7 +50,7 @@ pub(crate) fn top(args: &TopArgs, registry: &Registry) -> Result<Status> {
     let (mut before, mut since) = (look(), Instant::now());
     loop {
         while since.elapsed() < interval && !stop.load(Ordering::Relaxed) && running.run.is_running() {
-            thread::sleep(LOOK_INTERVAL.min(interval));
+            thread::sleep(INTERRUPT_INTERVAL.min(interval));
         }
         if stop.load(Ordering::Relaxed) {
             return Ok(Status::Done);

@@ -5,8 +5,8 @@
 mod server;
 mod watched;
 
+use super::MESSAGE_INTERVAL;
 use super::running::{RunChoice, Running, find_run};
-use super::tap::LOOK_INTERVAL;
 use crate::commands::report::LivePage;
 use crate::interrupt::stop_on_interrupt;
 use crate::status::Status;
@@ -70,7 +70,7 @@ pub(crate) fn view(args: &ViewArgs, registry: &Registry) -> Result<Status> {
         if stop.load(Ordering::Relaxed) {
             break;
         }
-        thread::sleep(LOOK_INTERVAL);
+        thread::sleep(MESSAGE_INTERVAL);
     }
     if watched.missed() > 0 {
         eprint_line(format_args!("{} messages were missed: this program was too slow", watched.missed()));
