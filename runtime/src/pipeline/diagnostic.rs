@@ -90,7 +90,7 @@ impl Problems {
     /// No errors yet, for a pipeline file.
     pub(super) fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
         let file = SourceText { name: name.into(), text: text.into() };
-        Self(PipelineErrors { sources: vec![file], list: Vec::new(), has_more: false })
+        Self(PipelineErrors { sources: vec![file], list: Vec::new(), has_more: false, is_unreadable: false })
     }
 
     /// Adds another text, such as a setting of the command line. Returns its index, for [`Location`].
@@ -130,14 +130,16 @@ pub struct PipelineErrors {
     list: Vec<Diagnostic>,
     /// Whether there are more than these.
     has_more: bool,
+    /// Whether the only error is that the pipeline cannot be read.
+    is_unreadable: bool,
 }
 
 impl PipelineErrors {
-    /// A single error without a location, of the pipeline called `name`.
+    /// The error that the pipeline called `name` cannot be read. `problem` is all that is shown.
     pub fn of_whole(name: &str, problem: impl Into<String>) -> Self {
         let mut problems = Problems::new(name, "");
         problems.push(Diagnostic::new(problem.into()));
-        problems.into_errors()
+        Self { is_unreadable: true, ..problems.into_errors() }
     }
 
     /// The number of errors that are shown.
@@ -153,6 +155,9 @@ impl PipelineErrors {
         for diagnostic in &self.list {
             text.push_str(&renderer.render(&[self.group(diagnostic)]));
             text.push_str("\n\n");
+        }
+        if self.is_unreadable {
+            return text.trim_end().to_owned();
         }
         let name = self.sources.first().map_or("the pipeline", |file| file.name.as_str());
         let count = match self.list.len() {

@@ -356,6 +356,7 @@ fn a_file_that_cannot_be_read_is_named() {
     let load = |path: &Path| Pipeline::load(path, &registry(), &Overrides::default());
     let missing = load(&folder.path().join("missing.toml")).unwrap_err().to_string();
     assert!(missing.contains("cannot read the pipeline") && missing.contains("missing.toml"), "{missing}");
+    assert!(!missing.contains("has an error"), "{missing}");
     let binary = folder.path().join("binary.toml");
     std::fs::write(&binary, b"a = \"\xff\"").unwrap();
     assert!(load(&binary).unwrap_err().to_string().contains("byte 5 is not UTF-8"));
