@@ -19,18 +19,22 @@ use tracing_subscriber::layer::{self, Layer};
 use tracing_subscriber::prelude::*;
 use tracing_subscriber::registry::LookupSpan;
 
+/// The heading of the logging options in the help, where they come last.
+const HEADING: &str = "Logging";
+
 /// Logging options of all commands.
 #[derive(Debug, Args)]
 pub(crate) struct LoggingArgs {
     /// Log the work of the stages to standard error; twice: with every message. `RUST_LOG` sets it in detail.
-    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    #[arg(short, long, global = true, action = clap::ArgAction::Count, help_heading = HEADING)]
     verbose: u8,
-    /// The format of the log lines.
+    /// The format of the log lines: `text`, or `json` with an object on each line.
     #[arg(long, global = true, value_enum, default_value_t = LogFormat::Text, value_name = "FORMAT")]
+    #[arg(hide_possible_values = true, help_heading = HEADING)]
     log_format: LogFormat,
     /// Write a trace of the work of every stage, with every message, for Perfetto (ui.perfetto.dev) or
     /// chrome://tracing. Not with the engine `processes`.
-    #[arg(long, global = true, value_name = "FILE.json")]
+    #[arg(long, global = true, value_name = "FILE.json", help_heading = HEADING)]
     pub(crate) trace: Option<PathBuf>,
 }
 
