@@ -103,7 +103,7 @@ pub struct Connection {
     _open: Open,
 }
 
-/// What a browser asks for.
+/// The request of a browser.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Request {
     /// The method, such as `GET`.
@@ -159,7 +159,7 @@ impl Connection {
         );
         self.write_all(head.as_bytes())?;
         self.write_all(text.as_bytes())?;
-        // What the browser still sends is read for a while: closing on it would discard the answer.
+        // The rest of the request is read for a while: closing on it would discard the answer.
         self.stream.shutdown(Shutdown::Write)?;
         let end = Instant::now() + CLOSE_TIMEOUT;
         let mut rest = [0; 4096];

@@ -36,7 +36,7 @@ pub(crate) struct OneMap {
     pub(crate) idle: BTreeSet<String>,
 }
 
-/// What a channel shows.
+/// The data of a channel that are looked at.
 enum Shown {
     /// The frame of the map.
     Map,

@@ -1,4 +1,4 @@
-//! How the program does with little address space (`ulimit -v`): its threads reserve less of it.
+//! Limits of the address space (`ulimit -v`): within one, threads reserve less.
 //!
 //! The allocator of the C library sets aside 64 MB for each thread, of which little is used. Within a limit that leaves
 //! nothing for what is needed, and then the program ends with a signal. With one arena for all threads it sets aside
@@ -16,11 +16,11 @@ const ARENAS: &str = "MALLOC_ARENA_MAX";
 /// The number of threads of parallel loops, an environment variable of rayon.
 const LOOP_THREADS: &str = "RAYON_NUM_THREADS";
 
-/// What the program itself reserves, bytes.
+/// The address space of the program itself, bytes.
 const PROGRAM: u64 = 128 << 20;
-/// What the allocator sets aside for a thread, bytes.
+/// The address space that the allocator reserves for a thread, bytes.
 const ARENA: u64 = 64 << 20;
-/// What a thread of parallel loops reserves for its stack and for what it works on, bytes.
+/// The address space of a thread of parallel loops for its stack and its data, bytes.
 const LOOP_THREAD: u64 = 8 << 20;
 /// The number of threads beside those of parallel loops and of prefetching.
 const OTHER_THREADS: u64 = 8;

@@ -100,7 +100,7 @@ impl RunSummary {
     /// Checks that a run that merges maps had any.
     pub(crate) fn check_for_maps(&self) -> Result<()> {
         if self.merge.as_ref().is_some_and(|merge| merge.frames.is_empty() && merge.unmerged.is_empty()) {
-            // What was found comes first: the advice is for logs in which nothing was.
+            // Findings come first: the advice is for logs without any.
             bail!(
                 "the input has no usable map{}\n\
                  a nav_msgs/msg/OccupancyGrid is needed for each robot, by default on /ROBOT/map; `gridweave info LOG` lists the \
@@ -176,7 +176,7 @@ impl RunSummary {
     }
 
     /// Each text of a warning once, in the order in which they appear, with the stages that warn so and their greatest
-    /// count: several stages take the same map, and have the same to say of it.
+    /// count: several stages take the same map, and warn of it alike.
     fn distinct_warnings(&self) -> Vec<(&str, Vec<&str>, u64)> {
         let mut distinct: Vec<(&str, Vec<&str>, u64)> = Vec::new();
         // A log may have tens of thousands of topics with a text of their own.

@@ -32,7 +32,7 @@ pub(crate) struct Trace {
     writing: Option<FlushGuard>,
 }
 
-/// What was written of a trace.
+/// The written part of a trace.
 #[derive(Default)]
 struct Progress {
     bytes: AtomicU64,

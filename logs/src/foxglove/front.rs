@@ -104,7 +104,7 @@ mod tests {
         assert!(foreign.iter().all(|origin| !is_trusted(origin, own, &sites)));
     }
 
-    /// What a client is answered that sends a request with an origin.
+    /// The answer to a request with an origin.
     fn answer(address: SocketAddr, origin: &str) -> String {
         let mut stream = TcpStream::connect(address).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();

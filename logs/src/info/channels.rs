@@ -1,4 +1,4 @@
-//! What the channels of logs show before any message is read.
+//! The robots of logs by their channels, before any message is read.
 
 use crate::names::{self, Input, NameError, NameRules};
 use crate::robots::{RobotChannels, Role};

@@ -241,7 +241,7 @@ impl RobotSurvey {
     pub(super) fn remove_merged_maps(&mut self) {
         let frames = std::mem::take(&mut self.map_frames);
         let mut origin = |robot: &str, frame: &str| self.merged_maps.origin(robot, frame, self.roles.mapped());
-        // What decides is what is known of all.
+        // The frames of all robots decide.
         for (robot, (_, frame)) in &frames {
             origin(robot, frame);
         }

@@ -114,8 +114,7 @@ fn in_other_case(images: &[PathBuf]) -> Option<PathBuf> {
     images.iter().find_map(found)
 }
 
-/// What a file is that is no image of a supported format, by its first bytes, and what would mend it; `None` if it may
-/// be one.
+/// The type of a file that is no image of a supported format, by its first bytes, and advice; `None` if it may be one.
 fn unreadable_type(bytes: &[u8]) -> Option<String> {
     const SUPPORTED: &str = "PGM, PPM, PBM, PNG, BMP and JPEG are read: convert it to one of these, such as PNG";
     let formats: [(&[u8], &str); 5] = [

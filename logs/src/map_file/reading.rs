@@ -47,7 +47,7 @@ impl Reading {
     /// The interpretation corrected by the image, and the corrections.
     pub(super) fn by_picture(self, shades: &Shades) -> (Self, MapFileWarning) {
         let has_opacity = shades.has_opacity();
-        // Where opacity scales the occupancy it says what is unknown.
+        // With this mode, opacity marks unknown cells.
         if self.mode == Mode::Scale && has_opacity {
             return (self, MapFileWarning::default());
         }

@@ -28,7 +28,7 @@ impl LoggedName {
             named.map(|found| found.robot.to_owned()).collect()
         };
         let topics: BTreeSet<&str> = channels.iter().map(|channel| channel.topic.as_str()).collect();
-        // What is the robot's is under its name, and no topic under its name would be another one without it.
+        // The robot's topics are under its name, and none of them equals another topic without it.
         let can_drop = |name: &String| {
             let under = format!("/{name}");
             channels.iter().all(|channel| {
@@ -46,7 +46,7 @@ impl LoggedName {
         }
         let mut with_maps = of_role(|role| role == Role::Map);
         with_maps.remove(robot);
-        // Where no robot is looked for, it does not matter that none is found.
+        // A missing robot matters only if robots are looked for.
         let matters = !with_maps.is_empty() && rules.convention == Convention::ByRobot;
         if matters { Self::Several(with_maps) } else { Self::Same }
     }

@@ -62,7 +62,7 @@ pub fn rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -
     for topic in named.into_iter().chain(nameless.into_iter().filter(|_| !is_shared)) {
         let Some(robot) = robot_of_part(topic, &robots) else { continue };
         let renamed = pattern.replace(ROBOT, &robot);
-        // What the option takes is the only thing that is advised.
+        // Only a valid value of the option is advised.
         if format!("{topic}={renamed}").parse::<TopicRename>().is_ok() {
             advice.push(format!("--rename '{topic}={renamed}'"));
             robots.insert(robot);

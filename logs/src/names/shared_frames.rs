@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// The number of messages that are searched for the first map of each robot, in logs without an index.
 const SEARCHED: usize = 20_000;
 
-/// What is known of the frames without a robot's name.
+/// The frames without a robot's name.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct SharedFrames {
     /// The robots whose maps are logged in a frame, by this frame.

@@ -74,7 +74,7 @@ fn undescribed_files(folder: &Path) -> Result<Vec<PathBuf>, ReadError> {
     }
 }
 
-/// What to give instead of a folder that is no bag: the maps, bags or logs in it.
+/// The advice for a folder that is no bag: the maps, bags or logs in it.
 fn advice_in(folder: &Path) -> String {
     let entries = std::fs::read_dir(folder).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path()));
     let mut entries: Vec<PathBuf> = entries.collect();

@@ -45,7 +45,7 @@ pub enum CellValues {
     TwoClasses,
 }
 
-/// What the values of one map's cells mean.
+/// The meaning of the values of one map's cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Convention {
     /// What map servers write.

@@ -1,4 +1,4 @@
-//! What the topic and the message type of a channel alone say of its role.
+//! The role of a channel by its topic and its message type alone.
 
 use super::driver_topics::DriverTopics;
 use super::role::{Classified, PoseSource, Role};

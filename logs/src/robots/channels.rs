@@ -21,7 +21,7 @@ pub(crate) struct RobotChannels {
     needs_tf: bool,
 }
 
-/// What the channels of a robot hold, by their topics and types alone.
+/// The data of a robot in the channels of logs, by their topics and types alone.
 #[derive(Clone, Copy, Debug, Default)]
 struct RobotData {
     has_maps: bool,
@@ -189,7 +189,7 @@ impl RobotChannels {
     }
 }
 
-/// What the channels of each robot hold.
+/// The data of each robot, by name.
 fn data_of_robots(patterns: &ChannelPatterns, channels: &[&Channel]) -> BTreeMap<String, RobotData> {
     let mut robots: BTreeMap<String, RobotData> = BTreeMap::new();
     for channel in channels {

@@ -15,7 +15,7 @@ struct MapStart {
     info: MapMetaData,
 }
 
-/// What is wrong with the rotation of a map's origin, of which only the yaw is used; `None` if it is in the plane, or
+/// The error in the rotation of a map's origin, of which only the yaw is used; `None` if it is in the plane, or
 /// if the message is no map.
 pub(crate) fn tilt_of(map: &[u8]) -> Option<String> {
     let Quaternion { x, y, z, w } = decode::<MapStart>(map).ok()?.info.origin.orientation;

@@ -5,12 +5,11 @@ use gridweave_runtime::ros::{Header, TFMessage, decode};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
-/// So many static messages are kept, and so many edges are known: more than programs of robots have, and a bound for
-/// others.
+/// The maximum numbers of static messages that are kept, and of edges: more than programs of robots have.
 const MAX_STATIC: usize = 256;
 const MAX_EDGES: usize = 4096;
 
-/// What is known of the frames in transforms of all robots. A log shows all of its maps and transforms from the start;
+/// The frames in the transforms of all robots. A log shows all of its maps and transforms from the start;
 /// live they come one by one.
 #[derive(Debug, Default)]
 pub(super) struct LiveFrames {
@@ -24,7 +23,7 @@ pub(super) struct LiveFrames {
 }
 
 impl LiveFrames {
-    /// What is known; `None` if no frame is to be renamed.
+    /// The frames so far; `None` if no frame is to be renamed.
     pub(super) fn shared(&self) -> Option<&Arc<SharedFrames>> {
         self.shared.as_ref()
     }

@@ -1,5 +1,5 @@
-//! What holds from the beginning of a log, though it is logged later: where sensors are mounted, and the frames of
-//! maps.
+//! Data that are valid from the beginning of a log although they are logged later: the mounts of sensors, and the frames
+//! of maps.
 //!
 //! A program that joins a live robot receives the static transforms and the last map before anything else. A recorder
 //! writes them when they come: a driver that starts after its robot, or a map that is first published after a minute,
@@ -41,7 +41,7 @@ pub(super) fn learn_ahead(files: &Arc<[LogFile]>, names: &Names, router: &mut Ch
         (_, Ahead::StaticTransforms) => Some(ChannelPart::Whole),
         (_, Ahead::Transforms | Ahead::Map) => Some(ChannelPart::Beginning),
     });
-    // What comes first holds from the beginning; what replaces it later is learnt when it comes.
+    // The first transform is valid from the beginning; a later one is read when it comes.
     let mut placed = BTreeSet::new();
     let mut renamed = Vec::new();
     while let Some(message) = reader.next_message() {
@@ -58,7 +58,7 @@ pub(super) fn learn_ahead(files: &Arc<[LogFile]>, names: &Names, router: &mut Ch
     }
 }
 
-/// What a channel shows ahead of its messages.
+/// The data of a channel that are read ahead.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Ahead {
     /// Transforms that hold for the whole log.

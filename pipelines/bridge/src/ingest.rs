@@ -94,11 +94,11 @@ impl Ingest {
             }
         };
         let number = batch.number;
-        let mut told = Taken { sender: batch.sender.clone(), session: batch.session, ..Default::default() };
+        let mut taken = Taken { sender: batch.sender.clone(), session: batch.session, ..Default::default() };
         let known = self.senders.get(&batch.session).map(|sender| (sender.handshake, sender.next));
         // A delayed batch was taken before, or its messages were sent again after a restart.
         if known.is_some_and(|known| (batch.handshake, number) < known) {
-            return (told, answer(number, Outcome::Taken, ""));
+            return (taken, answer(number, Outcome::Taken, ""));
         }
         let kept = self.kept();
         if number == 0 {
@@ -107,8 +107,8 @@ impl Ingest {
             if (is_new && self.senders.len() >= MAX_SENDERS) || kept.saturating_add(links_size) > MAX_KEPT {
                 let wrong = "there are too many senders, or they have too many links".to_owned();
                 let answer = answer(number, Outcome::Unreadable, &wrong);
-                told.wrong = Some(wrong);
-                return (told, answer);
+                taken.wrong = Some(wrong);
+                return (taken, answer);
             }
             let links = batch.links.into_iter().map(Arc::new).collect();
             let before = self.senders.remove(&batch.session).unwrap_or_default();
@@ -116,30 +116,30 @@ impl Ingest {
             let known = BTreeMap::new();
             let sender = Sender { links, handshake: batch.handshake, next: 1, correction, dropped, known };
             self.senders.insert(batch.session, sender);
-            return (told, answer(number, Outcome::Taken, ""));
+            return (taken, answer(number, Outcome::Taken, ""));
         }
         let is_next = known == Some((batch.handshake, number)) && batch.receiver == self.receiver;
         let Some(sender) = self.senders.get_mut(&batch.session).filter(|_| is_next) else {
-            return (told, answer(number, Outcome::Unknown, ""));
+            return (taken, answer(number, Outcome::Unknown, ""));
         };
         let (dropped, is_end, offset) = (batch.dropped, batch.is_end, batch.clock_offset);
         if offset.saturating_sub(sender.correction).saturating_abs() > self.tolerance {
             sender.correction = if offset.saturating_abs() > self.tolerance { offset } else { 0 };
-            told.clock = Some(sender.correction);
+            taken.clock = Some(sender.correction);
         }
         match sender.items(batch.entries, MAX_KEPT.saturating_sub(kept)) {
             Ok(items) => {
                 sender.next += 1;
-                (told.items, told.is_end) = (items, is_end);
-                told.dropped = dropped.saturating_sub(std::mem::replace(&mut sender.dropped, dropped));
-                (told, answer(number, Outcome::Taken, ""))
+                (taken.items, taken.is_end) = (items, is_end);
+                taken.dropped = dropped.saturating_sub(std::mem::replace(&mut sender.dropped, dropped));
+                (taken, answer(number, Outcome::Taken, ""))
             }
             Err(wrong) => {
                 // The state of the sender is incomplete.
                 self.senders.remove(&batch.session);
                 let answer = answer(number, Outcome::Unreadable, &wrong);
-                told.wrong = Some(wrong);
-                (told, answer)
+                taken.wrong = Some(wrong);
+                (taken, answer)
             }
         }
     }

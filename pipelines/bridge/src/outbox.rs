@@ -183,14 +183,14 @@ impl Outbox {
 
     fn put(&mut self, key: (u32, String), entry: Entry, bytes: &[u8], is_state: bool) -> Result<(), String> {
         let topic = self.topics.entry(key.clone()).or_default();
-        let mut told = entry.clone();
-        (told.form, told.bytes) = match (is_state, &topic.last) {
+        let mut pending = entry.clone();
+        (pending.form, pending.bytes) = match (is_state, &topic.last) {
             (false, _) => (Form::Whole, bytes.to_vec()),
             (true, Some((_, last))) => (Form::Difference, difference(last, bytes).map_err(|error| error.to_string())?),
             (true, None) => (Form::Beginning, difference(&[], bytes).map_err(|error| error.to_string())?),
         };
-        topic.last = Some((Entry { form: told.form, ..entry }, bytes.to_vec()));
-        let order = self.wait(told, bytes.len() as u64);
+        topic.last = Some((Entry { form: pending.form, ..entry }, bytes.to_vec()));
+        let order = self.wait(pending, bytes.len() as u64);
         if let Some(topic) = self.topics.get_mut(&key) {
             topic.waiting.push_back(order);
         }

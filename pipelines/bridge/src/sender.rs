@@ -267,10 +267,11 @@ impl Worker {
             }
             // A report has the log time of the previous message, because the log time of a played log is not the clock.
             if let (Some(report), Some(log_time)) = (&mut self.report, state.outbox.last_log_time()) {
-                let told = report.take(Instant::now(), log_time, self.settings.clock.nanoseconds().unsigned_abs());
-                let told =
-                    told.and_then(|told| told.map_or(Ok(()), |(header, bytes)| state.outbox.report(&header, &bytes)));
-                if let Err(wrong) = told {
+                let reported = report.take(Instant::now(), log_time, self.settings.clock.nanoseconds().unsigned_abs());
+                let reported = reported.and_then(|reported| {
+                    reported.map_or(Ok(()), |(header, bytes)| state.outbox.report(&header, &bytes))
+                });
+                if let Err(wrong) = reported {
                     state.notify(format!("cannot report the progress of the stages: {wrong}"));
                     self.report = None;
                 }

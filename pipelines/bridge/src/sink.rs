@@ -181,8 +181,8 @@ impl BridgeSink {
         let settings = parameters.settings(clock, context);
         let interval =
             Duration::try_from_secs_f64(parameters.report_stages).ok().filter(|interval| !interval.is_zero());
-        let told = context.statistics.clone().zip(interval);
-        let report = told.map(|(statistics, interval)| Report::new(&settings.name, statistics, interval));
+        let reported = context.statistics.clone().zip(interval);
+        let report = reported.map(|(statistics, interval)| Report::new(&settings.name, statistics, interval));
         Ok(Self {
             sender: Sender::start(settings, links.clone(), report)?,
             links,
@@ -207,7 +207,7 @@ impl BridgeSink {
             }
             _ => self.sender.push(message.wire(), message.header(), message.bytes())?,
         }
-        self.tell(output);
+        self.report_counts(output);
         Ok(())
     }
 
@@ -235,7 +235,7 @@ impl BridgeSink {
 
     pub(super) fn finish(&mut self, output: &Output<()>) -> Result<(), StageError> {
         let unacknowledged = self.sender.end(self.linger);
-        self.tell(output);
+        self.report_counts(output);
         if let Some(messages) = unacknowledged {
             let seconds = self.linger.as_secs_f64();
             let text = format!("the other end of the bridge has not acknowledged the end within {seconds} s");
@@ -247,7 +247,7 @@ impl BridgeSink {
     }
 
     /// Counts the changes of the totals since the last call, and forwards notices.
-    fn tell(&mut self, output: &Output<()>) {
+    fn report_counts(&mut self, output: &Output<()>) {
         let now = self.sender.totals();
         let before = std::mem::replace(&mut self.counted, now);
         for (what, more) in [

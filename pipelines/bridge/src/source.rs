@@ -256,7 +256,7 @@ impl BridgeSource {
         let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
         let (taken, answer) = self.ingest.take(&bytes);
         let sender = taken.sender.clone();
-        self.tell(&taken, output);
+        self.report_batch(&taken, output);
         for item in taken.items {
             self.send(taken.session, item, output)?;
         }
@@ -277,7 +277,8 @@ impl BridgeSource {
         Ok(())
     }
 
-    fn tell(&self, taken: &Taken, output: &Output<Ports>) {
+    /// Warns of a batch that cannot be read, of dropped messages, and of a wrong clock.
+    fn report_batch(&self, taken: &Taken, output: &Output<Ports>) {
         let sender = &taken.sender;
         if let Some(wrong) = &taken.wrong {
             warn(output, format!("cannot read a batch of the sender `{sender}`: {wrong}"));

@@ -184,7 +184,7 @@ fn what_an_end_tells_of_itself_does_not_pile_up_and_is_not_counted() {
 fn times_are_corrected_where_the_clocks_differ_by_more_than_they_may() {
     const HOUR: i64 = 3600 * SECOND;
     let at = 2 * HOUR as u64;
-    for (offset, expected, told) in [
+    for (offset, expected, clock) in [
         (0, at, None),
         (SECOND / 2, at, None),
         (-HOUR, at - HOUR as u64, Some(-HOUR)),
@@ -193,7 +193,7 @@ fn times_are_corrected_where_the_clocks_differ_by_more_than_they_may() {
         let (mut outbox, mut ingest) = (outbox(7, 3), Ingest::new(1, SECOND));
         outbox.push(POSES, &header("/robot1/pose", at), &[1]).unwrap();
         let taken = carry(&mut outbox, &mut ingest, offset);
-        assert_eq!((messages(&taken.items)[0].0, taken.clock), (expected, told), "{offset}");
+        assert_eq!((messages(&taken.items)[0].0, taken.clock), (expected, clock), "{offset}");
     }
 }
 

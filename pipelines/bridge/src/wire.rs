@@ -168,8 +168,8 @@ pub(super) enum Outcome {
 }
 
 /// Encodes a message between the ends.
-pub(super) fn to_bytes<T: Serialize>(said: &T) -> Result<Vec<u8>, String> {
-    let plain = encode(said).map_err(|error| error.to_string())?;
+pub(super) fn to_bytes<T: Serialize>(content: &T) -> Result<Vec<u8>, String> {
+    let plain = encode(content).map_err(|error| error.to_string())?;
     let packed = difference::difference(&[], &plain).map_err(|error| error.to_string())?;
     Ok([VERSION.to_le_bytes().as_slice(), &packed].concat())
 }

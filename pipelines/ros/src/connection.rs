@@ -82,7 +82,7 @@ impl Connection {
     /// Joins a domain on DDS.
     ///
     /// # Errors
-    /// The environment wants nobody to be found, or the system refuses the sockets.
+    /// The environment turns discovery off, or the system refuses the sockets.
     pub(crate) fn join_dds(&self, domain: u32, name: &NodeIdentity) -> Result<DdsNode, StageError> {
         let range = match self.discovery_range {
             Some(range) => Some(range),

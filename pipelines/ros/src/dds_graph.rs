@@ -14,13 +14,13 @@ use std::time::{Duration, Instant};
 pub(crate) const NAMES_TOPIC: &str = "ros_discovery_info";
 /// The prefix of all topics of ROS.
 pub(crate) const TOPIC_PREFIX: &str = "rt";
-/// So long the name of an endpoint's node is waited for.
+/// The maximum wait for the name of an endpoint's node.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// So long a mismatch may last before it is reported: a subscriber here may subscribe again with what all offer, once
+/// How long a mismatch lasts before it is reported: a subscriber here may subscribe again with what all offer, once
 /// it is known whose the endpoint is.
 const MISMATCH_PATIENCE: Duration = Duration::from_secs(2);
 
-/// So many digits of a type's hash are shown.
+/// The number of digits of a type's hash that are shown.
 const HASH_DIGITS: usize = 8;
 
 /// Called with an entity that is there, or is no more.
@@ -76,7 +76,7 @@ impl Graph {
         lock(&self.seen).mismatches.retain(|(_, mismatch)| mismatch.here.guid != here);
     }
 
-    /// Takes up what a participant says of its nodes.
+    /// Records the names of a participant's nodes.
     pub(crate) fn note_names(&self, message: &[u8]) {
         let mut seen = lock(&self.seen);
         for (name, endpoints) in nodes(message).unwrap_or_default() {
@@ -187,7 +187,7 @@ fn entity(domain: u32, endpoint: &EndpointData, name: Option<&NodeName>) -> Opti
     })
 }
 
-/// What to say of an endpoint here and one there that cannot hear each other.
+/// The warning about a local and a remote endpoint that do not match.
 fn problem(mismatch: &Mismatch, name: Option<&NodeName>) -> String {
     let Mismatch { here, there, policies } = mismatch;
     let topic = here.topic.strip_prefix(TOPIC_PREFIX).unwrap_or(&here.topic);

@@ -9,7 +9,7 @@ pub(crate) const TYPE: &str = "rmw_dds_common::msg::dds_::ParticipantEntitiesInf
 pub(crate) const TYPE_HASH: &str = "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e";
 /// The sizes of an identifier in it, since Iron and before, bytes.
 const ID_SIZES: [usize; 2] = [16, 24];
-/// So many bytes may follow a message, to align what comes after it.
+/// The maximum number of padding bytes after a message.
 const PADDING: usize = 3;
 
 /// The name of a node.

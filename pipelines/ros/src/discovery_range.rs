@@ -22,7 +22,7 @@ pub enum DiscoveryRange {
 }
 
 impl DiscoveryRange {
-    /// The range that the environment asks for; `None` if nobody is to be found.
+    /// The range that the environment asks for; `None` if discovery is off.
     ///
     /// # Errors
     /// It asks for something that there is not.

@@ -48,7 +48,7 @@ fn look(parameters: toml::Table, longest: Duration) -> Result<String> {
     let topics = || publishers.lock().unwrap_or_else(PoisonError::into_inner).topics();
     let (robots, until) = (RobotTopics::default(), Instant::now() + longest);
     let mut subscriptions = DoctorSubscriptions::default();
-    // Who is there says so again and again.
+    // Nodes announce themselves again and again.
     while let Some(rest) = until.checked_duration_since(Instant::now()) {
         subscriptions.subscribe(&mut node, &topics(), &robots)?;
         thread::sleep(rest.min(PERIOD));

@@ -23,7 +23,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// So many events are handled at a time.
+/// The number of events that are handled at a time.
 const BATCH: usize = 64;
 
 /// The kind `ros_source`.
@@ -249,7 +249,7 @@ impl RosSource {
         Ok(())
     }
 
-    /// The same topic on another middleware, if it is heard there.
+    /// The same topic on another middleware, if it is received there.
     fn on_another_middleware(&self, offered: &OfferedTopic) -> Option<OfferedTopic> {
         let is_other =
             |other: &&OfferedTopic| other.topic.name == offered.topic.name && other.middleware != offered.middleware;

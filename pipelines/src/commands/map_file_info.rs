@@ -31,7 +31,7 @@ pub(super) struct MapFileInfo {
     occupied_m2: f64,
     /// Area of cells that are known, but neither free nor occupied, square metres.
     undecided_m2: f64,
-    /// What was read otherwise than the thresholds of the file have it.
+    /// A warning if the file was not read by its thresholds.
     #[serde(rename = "remark", skip_serializing_if = "Option::is_none")]
     warning: Option<String>,
 }

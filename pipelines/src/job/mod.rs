@@ -57,7 +57,7 @@ impl<'a> From<Option<&'a Path>> for Output<'a> {
     }
 }
 
-/// Who watches a run.
+/// The observer of a run.
 pub(crate) enum Watcher<'a> {
     /// The user at a terminal: progress is shown, and an interrupt ends the run.
     Terminal,
@@ -71,7 +71,7 @@ pub(crate) struct Job<'a> {
     pub(crate) pipeline: &'a Path,
     /// Files for the only source of logs or map files; if empty, those of the pipeline.
     pub(crate) inputs: &'a [PathBuf],
-    /// What these are.
+    /// The kind of the inputs.
     pub(crate) kind: Inputs,
     /// The output beside the files of the options.
     pub(crate) output: Output<'a>,

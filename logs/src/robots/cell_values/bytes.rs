@@ -14,7 +14,7 @@ const INSCRIBED_COST: usize = 253;
 /// An unknown cell of a costmap, and -1 as a byte.
 const NO_INFORMATION: usize = 255;
 
-/// What bytes stand for that no cell of an occupancy grid has.
+/// The meaning of bytes that no cell of an occupancy grid has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ByteValues {
     /// The pixels of a map server's image: 205 is unknown. The rarer of black and white is occupied, as walls are.
@@ -44,7 +44,7 @@ impl fmt::Display for ByteValues {
 }
 
 impl ByteValues {
-    /// What the values outside -1 to 100 stand for; `None` if there are none.
+    /// The meaning of the values outside -1 to 100; `None` if there are none.
     pub(super) fn of(cells: &[i8]) -> Option<Self> {
         let mut counts = [0_u64; 256];
         cells.iter().for_each(|value| counts[usize::from(value.cast_unsigned())] += 1);

@@ -25,7 +25,7 @@ const LARGEST: usize = 1 << 30;
 /// Writes a ROS 1 bag (format 2.0), chunked and indexed.
 ///
 /// The file is written as `NAME.part` and renamed when it is [finished](Self::finish). Until then it has no index, and
-/// so has a bag whose run has failed: programs of ROS say of it that it is not indexed, and `rosbag reindex` mends it.
+/// neither has a bag whose run has failed: programs of ROS report it as not indexed, and `rosbag reindex` repairs it.
 pub(in crate::sink) struct BagWriter {
     path: PathBuf,
     output: OutputFile,

@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 /// No sample is larger, bytes.
 const LARGEST_SAMPLE: u32 = 1 << 30;
 
-/// The fragments of a sample that have come. It takes as much memory as they do, whatever they say of the sample's
-/// size.
+/// The received fragments of a sample. Its memory is that of the fragments, whatever size of the sample they state.
 #[derive(Debug)]
 pub(crate) struct Assembly {
     sample_size: u32,

@@ -1,4 +1,4 @@
-//! What participants say of themselves and of their endpoints (RTPS 2.3, 8.5).
+//! Discovery data of participants and of their endpoints (RTPS 2.3, 8.5).
 
 use super::cursor::Cursor;
 use super::guid::{EntityId, Guid, Prefix};
@@ -17,11 +17,11 @@ const ENDPOINTS: u32 = 0b11_1111;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ParticipantData {
     pub(crate) prefix: Prefix,
-    /// Where it hears of the endpoints of others.
+    /// The addresses for discovery messages about endpoints.
     pub(crate) discovery: Vec<SocketAddrV4>,
-    /// Where its readers hear, and its writers hear answers.
+    /// The addresses of its readers, and for answers to its writers.
     pub(crate) user: Vec<SocketAddrV4>,
-    /// So long after it was last heard of it is taken to be gone.
+    /// It is gone this long after its last message.
     pub(crate) lease: Duration,
     /// Its enclave of SROS, `/` without one, or nothing if it is no program of ROS.
     pub(crate) enclave: String,

@@ -23,8 +23,8 @@ pub(crate) fn bytes(address: SocketAddrV4) -> [u8; 24] {
     bytes
 }
 
-/// Of the addresses of a participant those to send to: the one from which it was heard, or else all that other machines
-/// can reach, or else all.
+/// The addresses of a participant to send to: the one that it sent from, or else all that other machines can reach, or
+/// else all.
 pub(crate) fn reachable(addresses: &[SocketAddrV4], heard_from: Ipv4Addr) -> Vec<SocketAddrV4> {
     let those = |is_so: &dyn Fn(&Ipv4Addr) -> bool| -> Vec<SocketAddrV4> {
         addresses.iter().filter(|address| is_so(address.ip())).copied().collect()

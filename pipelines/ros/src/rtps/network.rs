@@ -12,14 +12,14 @@ use std::time::Duration;
 const MULTICAST_GROUP: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
 /// The highest domain whose ports are all below those that systems give away, and the highest at all.
 pub(crate) const LAST_DOMAIN: u32 = 232;
-/// So many participants can be on one machine in one domain.
+/// The maximum number of participants on one machine in one domain.
 const PARTICIPANTS: u16 = 120;
-/// Of the participants on a machine that is not reached by multicast so many are looked for.
+/// The number of participants that are looked for on a machine without multicast.
 const LOOKED_FOR: u16 = 32;
 /// What waits to be read, at most, bytes: a map in its fragments. The system may allow less.
 const BUFFER_SIZE: usize = 4 << 20;
 
-/// Where others are looked for and heard.
+/// The networks on which other participants are discovered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Reach {
     /// On this machine alone. Nothing is listened to that other machines could reach.
@@ -98,7 +98,7 @@ impl Network {
         Ok(Self { discovery, user, multicast, multicast_senders, wake: [sender, receiver], ports, addresses, peers })
     }
 
-    /// Where it hears of others, and where it hears samples.
+    /// The addresses for discovery messages, and for samples.
     pub(crate) fn locators(&self) -> [Vec<SocketAddrV4>; 2] {
         [&self.discovery, &self.user].map(|socket| {
             let port = socket.local_addr().map_or(0, |address| address.port());
@@ -128,7 +128,7 @@ impl Network {
         }
         for peer in &self.peers {
             for participant in 0..LOOKED_FOR {
-                // Where nobody listens an error comes back, with the next datagram.
+                // If no program listens, the error comes with the next datagram.
                 let _ = self.user.send_to(bytes, (*peer, self.ports.discovery(participant)));
             }
         }
@@ -155,7 +155,7 @@ impl Network {
                     Ok((size, SocketAddr::V4(from))) => take(buffer.get(..size).unwrap_or_default(), *from.ip()),
                     Ok(_) => {}
                     Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
-                    // The answer to a datagram that nobody took.
+                    // The error of an earlier datagram that no program received.
                     Err(_) => {}
                 }
             }

@@ -41,7 +41,7 @@ type OnSample = Arc<dyn Fn(Sample) + Send + Sync>;
 pub(crate) trait Watch: Send + Sync {
     /// An endpoint is there, or is no more.
     fn endpoint(&self, endpoint: &EndpointData, is_there: bool);
-    /// An endpoint here and one there cannot hear each other.
+    /// A local and a remote endpoint do not match.
     fn mismatch(&self, mismatch: &Mismatch);
     /// Called at least every second.
     fn tick(&self);
@@ -85,7 +85,7 @@ fn new_prefix() -> Prefix {
 }
 
 impl Participant {
-    /// Joins a domain. `name` is what others may show, `enclave` what programs of ROS say of themselves.
+    /// Joins a domain. `name` is shown by other programs, `enclave` is that of ROS.
     ///
     /// # Errors
     /// The system refuses a socket or a thread.

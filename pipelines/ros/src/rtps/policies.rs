@@ -20,7 +20,7 @@ pub(crate) struct Policies {
     pub(crate) deadline: Option<u64>,
     /// How a writer shows that it lives: automatic, by its participant, by its topic.
     pub(crate) liveliness: u32,
-    /// So often at least, nanoseconds; `None` for any.
+    /// The maximum interval, nanoseconds; `None` for any.
     pub(crate) liveliness_lease: Option<u64>,
     pub(crate) is_exclusive: bool,
     pub(crate) partitions: Vec<String>,
@@ -76,7 +76,7 @@ impl Policies {
             .with(id::LIVELINESS, &words(&[0, INFINITE[0], INFINITE[1]]))
     }
 
-    /// Why a reader that requests these policies cannot hear a writer that offers others; nothing if it can.
+    /// The policies by which a reader that requests these does not match a writer that offers others.
     pub(crate) fn mismatches(&self, offered: &Self) -> Vec<&'static str> {
         let is_longer = |offered: Option<u64>, requested: Option<u64>| match (offered, requested) {
             (_, None) => false,

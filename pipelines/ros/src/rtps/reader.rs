@@ -21,9 +21,9 @@ const STALL: Duration = Duration::from_millis(20);
 const LONGEST_STALL: Duration = Duration::from_secs(1);
 /// The vendor of Fast DDS, as the identifiers of its participants begin.
 const FAST_DDS: [u8; 2] = [1, 15];
-/// So many samples wait for those before them. Further ones are asked for again.
+/// The maximum number of samples that wait for earlier ones. Further ones are requested again.
 const HELD_SAMPLES: usize = 1024;
-/// So many samples are put together at a time.
+/// The maximum number of samples that are assembled at a time.
 const ASSEMBLIES: usize = 16;
 
 /// A sample as it was received.
@@ -62,7 +62,7 @@ struct MatchedWriter {
     /// The number of its last heartbeat.
     heartbeat: Option<u32>,
     requests: u32,
-    /// When it is asked what it has, as nothing was heard of it yet.
+    /// When it is asked for its samples, because it has sent nothing yet.
     question: Option<(Instant, Duration)>,
     /// When missing fragments are asked for, if none come before.
     stall: Option<(Instant, Duration)>,

@@ -17,13 +17,13 @@ use std::time::Instant;
 pub(crate) enum Event {
     /// An endpoint of another participant is there, or is no more.
     Endpoint(Box<EndpointData>, bool),
-    /// An endpoint here and one there cannot hear each other.
+    /// A local and a remote endpoint do not match.
     Mismatch(Box<Mismatch>),
     /// A sample has come for a reader.
     Sample(EntityId, Sample),
 }
 
-/// Why an endpoint here and one there of one topic cannot hear each other.
+/// Why a local and a remote endpoint of one topic do not match.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Mismatch {
     pub(crate) here: EndpointData,
@@ -37,7 +37,7 @@ pub(crate) struct Mismatch {
 pub(crate) enum Role {
     Writer,
     Reader,
-    /// A reader that hears only what has the same definition of the type, and no run of Gridweave.
+    /// A reader that matches only writers with the same definition of the type, and none of a run of Gridweave.
     ReaderOfRobots,
 }
 
@@ -55,7 +55,7 @@ struct Announced {
 pub(super) struct Peer {
     pub(super) data: ParticipantData,
     pub(super) heard: Instant,
-    /// From where it was heard first.
+    /// The address that it first sent from.
     pub(super) from: Ipv4Addr,
 }
 
@@ -207,7 +207,7 @@ impl State {
         for entity in own {
             self.match_pair(entity, guid, now);
         }
-        // After the mismatches, which are over where somebody subscribes again because of it.
+        // After the mismatches, which end if a reader subscribes again because of it.
         self.events.push(Event::Endpoint(Box::new(data), true));
     }
 
@@ -218,7 +218,7 @@ impl State {
         self.events.push(Event::Endpoint(Box::new(data), false));
     }
 
-    /// Connects an endpoint here with one there if they are of one topic and can hear each other.
+    /// Connects a local endpoint with a remote one if they match.
     fn match_pair(&mut self, entity: EntityId, other: Guid, now: Instant) {
         let (Some(announced), Some(there)) = (self.announced.get(&entity), self.endpoints.get(&other)) else { return };
         let here = &announced.data;
@@ -283,7 +283,7 @@ const fn announcer(of_writers: bool) -> EntityId {
     if of_writers { EntityId::PUBLICATIONS_WRITER } else { EntityId::SUBSCRIPTIONS_WRITER }
 }
 
-/// The writer of announcements that a reader of them hears.
+/// The writer of announcements that matches a reader of them.
 fn matching(reader: EntityId) -> EntityId {
     announcer(reader == EntityId::PUBLICATIONS_READER)
 }

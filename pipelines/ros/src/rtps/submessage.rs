@@ -67,7 +67,7 @@ pub(crate) fn submessages(message: &[u8]) -> Vec<Submessage<'_>> {
     parts
 }
 
-/// What parts say of those after them.
+/// The sender, receiver and time that parts set for the later ones.
 struct Context {
     source: Prefix,
     destination: Prefix,

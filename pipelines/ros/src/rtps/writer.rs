@@ -249,7 +249,7 @@ impl Writer {
     }
 }
 
-/// Whether a reader has not heard anything of the writer yet.
+/// Whether a reader has received nothing of the writer yet.
 const fn known_nothing(missing: &NumberSet) -> bool {
     missing.base <= 1
 }

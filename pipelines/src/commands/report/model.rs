@@ -85,7 +85,7 @@ pub(super) struct Robot {
     pub(super) findings: Versions<Findings>,
 }
 
-/// What was found in a robot's map.
+/// The features of a robot's map.
 #[derive(Debug, Default, PartialEq, Serialize)]
 pub(super) struct Findings {
     /// Walls: both ends, reliability, inliers.
