@@ -16,6 +16,7 @@ mod consensus;
 mod drift;
 mod judge;
 mod parameters;
+mod refusal;
 mod stage;
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! Bearings of a tag, averaged by the robot's position.
 
+use super::position_groups::{Group, Measurement, PositionGroups};
 use super::{Position, Ray};
-use crate::shared::geometry::{Point2, wrap_angle};
-use nalgebra::{Matrix2, Vector2};
+use crate::shared::geometry::wrap_angle;
+use nalgebra::Matrix2;
 
 /// Largest difference of two bearings of one group, in standard deviations.
 const SAME_BEARING: f64 = 4.0;
@@ -26,62 +27,52 @@ pub struct Bearing {
 /// out: those of the pose and of the heading. A bearing that contradicts the others at its position makes a separate
 /// group, so that an outlier does not spoil a mean.
 #[derive(Clone, Debug, Default)]
-pub struct BearingGroups {
-    groups: Vec<Group>,
-    /// Index of the first group at the robot's present position.
-    here: usize,
-    bearings: u32,
+pub struct BearingGroups(PositionGroups<BearingSums>);
+
+/// Weighted sums over bearings.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct BearingSums {
+    /// The first bearing, radians: the others are relative to it, so that they do not wrap.
+    first: f64,
+    turn: f64,
+    yaw_variance: f64,
 }
 
-/// Weighted sums over bearings. Positions and directions are relative to the first one, so that sums lose no digits
-/// far from the origin, and directions do not wrap.
-#[derive(Clone, Copy, Debug)]
-struct Group {
-    anchor: Point2,
-    first_bearing: f64,
-    weight: f64,
-    offset: Vector2<f64>,
-    turn: f64,
-    pose_covariance: Matrix2<f64>,
-    yaw_variance: f64,
+impl Measurement for Bearing {
+    type Sums = BearingSums;
+
+    fn position(&self) -> &Position {
+        &self.position
+    }
+
+    fn stddev(&self) -> f64 {
+        self.stddev
+    }
+
+    fn no_sums(&self) -> BearingSums {
+        BearingSums { first: self.bearing, turn: 0.0, yaw_variance: 0.0 }
+    }
+
+    fn add_to(&self, sums: &mut BearingSums, weight: f64) {
+        sums.turn += wrap_angle(self.bearing - sums.first) * weight;
+        sums.yaw_variance += self.position.yaw_variance * weight;
+    }
+
+    fn agrees(&self, group: &Group<BearingSums>, offset: f64) -> bool {
+        wrap_angle(self.bearing - group.bearing()).abs() < SAME_BEARING * self.stddev + offset / NEAREST
+    }
 }
 
 impl BearingGroups {
     /// Adds a bearing. The robot is at a new position when it is `min_travel` metres or more away from the start of
     /// the last one.
-    pub fn add(&mut self, reading: &Bearing, min_travel: f64) {
-        self.bearings = self.bearings.saturating_add(1);
-        let Bearing { position, bearing, stddev } = *reading;
-        let place = self.groups.get(self.here).map(|group| group.anchor);
-        if !place.is_some_and(|anchor| (position.place - anchor).norm() < min_travel) {
-            self.here = self.groups.len();
-        }
-        let anchor = self.groups.get(self.here).map_or(position.place, |group| group.anchor);
-        let offset = position.place - anchor;
-        let gate = SAME_BEARING * stddev + offset.norm() / NEAREST;
-        let is_same = |group: &&mut Group| wrap_angle(bearing - group.bearing()).abs() < gate;
-        let found = self.groups[self.here..].iter_mut().find(is_same);
-        let group = match found {
-            Some(group) => group,
-            None => {
-                let (first_bearing, turn, weight, yaw_variance) = (bearing, 0.0, 0.0, 0.0);
-                let (offset, pose_covariance) = (Vector2::zeros(), Matrix2::zeros());
-                let last = self.groups.len();
-                self.groups.push(Group { anchor, first_bearing, weight, offset, turn, pose_covariance, yaw_variance });
-                &mut self.groups[last]
-            }
-        };
-        let weight = 1.0 / (stddev * stddev);
-        group.weight += weight;
-        group.offset += offset * weight;
-        group.turn += wrap_angle(bearing - group.first_bearing) * weight;
-        group.pose_covariance += position.covariance * weight;
-        group.yaw_variance += position.yaw_variance * weight;
+    pub fn add(&mut self, bearing: &Bearing, min_travel: f64) {
+        self.0.add(bearing, min_travel);
     }
 
     /// Number of bearings.
     pub fn bearings(&self) -> u32 {
-        self.bearings
+        self.0.measurements()
     }
 
     /// One ray for each group: variance of the mean direction including that of the heading, and the variance of the
@@ -91,44 +82,38 @@ impl BearingGroups {
     /// heading. The pose counts with its largest variance in any direction, as in
     /// [`ReadingGroups::rings`](super::ReadingGroups::rings).
     pub fn rays(&self, pose_stddev: f64, heading_stddev: f64) -> impl Iterator<Item = Ray> + '_ {
-        self.groups.iter().map(move |group| Ray {
-            origin: group.anchor + group.offset / group.weight,
+        self.0.iter().map(move |group| Ray {
+            origin: group.place(),
             bearing: group.bearing(),
             variance: group.variance(heading_stddev),
-            origin_variance: (super::largest_variance(&group.pose_covariance) / group.weight)
-                .max(pose_stddev * pose_stddev),
+            origin_variance: group.pose_variance(pose_stddev),
         })
     }
 
     /// Common error of the poses, which moves the tag; see
     /// [`ReadingGroups::shared_covariance`](super::ReadingGroups::shared_covariance).
     pub fn shared_covariance(&self, heading_stddev: f64) -> Matrix2<f64> {
-        let mut sum = Matrix2::zeros();
-        let mut weights = 0.0;
-        for group in &self.groups {
-            let weight = 1.0 / group.variance(heading_stddev);
-            sum += group.pose_covariance * (weight / group.weight);
-            weights += weight;
-        }
-        if weights > 0.0 { sum / weights } else { sum }
+        self.0.shared_covariance(|group| group.variance(heading_stddev))
     }
 }
 
-impl Group {
+impl Group<BearingSums> {
+    /// Mean direction, radians.
     fn bearing(&self) -> f64 {
-        // Before its first bearing is added, a group has no weight.
-        self.first_bearing + self.turn / self.weight.max(f64::MIN_POSITIVE)
+        // Bearings with an infinite deviation have no weight.
+        self.sums.first + self.sums.turn / self.weight.max(f64::MIN_POSITIVE)
     }
 
     /// Variance of the direction in the map, square radians.
     fn variance(&self, heading_stddev: f64) -> f64 {
-        1.0 / self.weight + (self.yaw_variance / self.weight).max(heading_stddev * heading_stddev)
+        1.0 / self.weight + (self.sums.yaw_variance / self.weight).max(heading_stddev * heading_stddev)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::shared::geometry::Point2;
     use std::f64::consts::PI;
 
     fn bearing(x: f64, bearing: f64) -> Bearing {

@@ -27,6 +27,7 @@ mod noise;
 mod parameters;
 mod pose_covariance;
 mod pose_track;
+mod position_groups;
 mod posterior;
 mod ray_product;
 mod read_out;

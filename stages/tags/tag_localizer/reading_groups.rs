@@ -1,8 +1,8 @@
 //! Range readings of a tag, averaged by the robot's position.
 
-use super::{Position, Ring, largest_variance};
-use crate::shared::geometry::Point2;
-use nalgebra::{Matrix2, Vector2};
+use super::position_groups::{Group, Measurement, PositionGroups};
+use super::{Position, Ring};
+use nalgebra::Matrix2;
 
 /// Largest difference of two readings of one group, in standard deviations.
 const SAME_RANGE: f64 = 4.0;
@@ -24,104 +24,78 @@ pub struct Reading {
 /// robot that waits does not make a tag certain. A reading that contradicts the others at its position makes a
 /// separate group, so that an outlier does not spoil a mean.
 #[derive(Clone, Debug, Default)]
-pub struct ReadingGroups {
-    groups: Vec<Group>,
-    /// Index of the first group at the robot's present position.
-    here: usize,
-    readings: u32,
-}
+pub struct ReadingGroups(PositionGroups<f64>);
 
-/// Weighted sums over readings. Positions are relative to the first one, so that sums lose no digits far from the
-/// origin.
-#[derive(Clone, Copy, Debug)]
-struct Group {
-    anchor: Point2,
-    weight: f64,
-    offset: Vector2<f64>,
-    range: f64,
-    pose_covariance: Matrix2<f64>,
+impl Measurement for Reading {
+    /// Of the ranges.
+    type Sums = f64;
+
+    fn position(&self) -> &Position {
+        &self.position
+    }
+
+    fn stddev(&self) -> f64 {
+        self.stddev
+    }
+
+    fn no_sums(&self) -> f64 {
+        0.0
+    }
+
+    fn add_to(&self, sum: &mut f64, weight: f64) {
+        *sum += self.range * weight;
+    }
+
+    fn agrees(&self, group: &Group<f64>, offset: f64) -> bool {
+        (group.range() - self.range).abs() < SAME_RANGE * self.stddev + offset
+    }
 }
 
 impl ReadingGroups {
     /// Adds a reading. The robot is at a new position when it is `min_travel` metres or more away from the start of
     /// the last one.
     pub fn add(&mut self, reading: &Reading, min_travel: f64) {
-        self.readings = self.readings.saturating_add(1);
-        let place = self.groups.get(self.here).map(|group| group.anchor);
-        if !place.is_some_and(|anchor| (reading.position.place - anchor).norm() < min_travel) {
-            self.here = self.groups.len();
-        }
-        let anchor = self.groups.get(self.here).map_or(reading.position.place, |group| group.anchor);
-        let weight = 1.0 / (reading.stddev * reading.stddev);
-        let offset = reading.position.place - anchor;
-        let gate = SAME_RANGE * reading.stddev + offset.norm();
-        let here = &mut self.groups[self.here..];
-        match here.iter_mut().find(|group| (group.range / group.weight - reading.range).abs() < gate) {
-            Some(group) => {
-                group.weight += weight;
-                group.offset += offset * weight;
-                group.range += reading.range * weight;
-                group.pose_covariance += reading.position.covariance * weight;
-            }
-            None => {
-                self.groups.push(Group {
-                    anchor,
-                    weight,
-                    offset: offset * weight,
-                    range: reading.range * weight,
-                    pose_covariance: reading.position.covariance * weight,
-                });
-            }
-        }
+        self.0.add(reading, min_travel);
     }
 
     /// Number of readings.
     pub fn readings(&self) -> u32 {
-        self.readings
+        self.0.measurements()
     }
 
-    /// One ring for each group: variance of the mean range, and that of the pose.
-    ///
-    /// An error of the pose changes a distance by its component along the line to the tag. That line is unknown, and
-    /// the mirror image is along another one. So the pose counts with its largest variance in any direction: that is
-    /// never too small, and at most twice the mean over all directions. `pose_stddev`, metres, is a lower bound of
-    /// its deviation.
+    /// One ring for each group: variance of the mean range, and that of the pose, at most in any direction.
+    /// `pose_stddev`, metres, is a lower bound of its deviation.
     pub fn rings(&self, pose_stddev: f64) -> impl Iterator<Item = Ring> + '_ {
-        self.groups.iter().map(move |group| Ring {
-            centre: group.anchor + group.offset / group.weight,
-            radius: group.range / group.weight,
+        self.0.iter().map(move |group| Ring {
+            centre: group.place(),
+            radius: group.range(),
             variance: group.variance(pose_stddev),
         })
     }
 
     /// Common error of the poses, which moves the tag and does not average out over positions: their mean covariance,
     /// weighted by the information of each ring, square metres. Zeros if it is unknown.
-    ///
-    /// The correlation of the errors of the poses is unknown. If it is full, the error of the tag is theirs; in any
-    /// case a mean of errors varies by no more than the mean of their variances.
     pub fn shared_covariance(&self, pose_stddev: f64) -> Matrix2<f64> {
-        let mut sum = Matrix2::zeros();
-        let mut weights = 0.0;
-        for group in &self.groups {
-            let weight = 1.0 / group.variance(pose_stddev);
-            sum += group.pose_covariance * (weight / group.weight);
-            weights += weight;
-        }
-        if weights > 0.0 { sum / weights } else { sum }
+        self.0.shared_covariance(|group| group.variance(pose_stddev))
     }
 }
 
-impl Group {
+impl Group<f64> {
+    /// Mean distance to the tag, metres.
+    fn range(&self) -> f64 {
+        self.sums / self.weight
+    }
+
     /// Variance of the distance between the position and the tag, square metres.
     fn variance(&self, pose_stddev: f64) -> f64 {
-        let pose_variance = largest_variance(&self.pose_covariance) / self.weight;
-        1.0 / self.weight + pose_variance.max(pose_stddev * pose_stddev)
+        1.0 / self.weight + self.pose_variance(pose_stddev)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::shared::geometry::Point2;
 
     fn reading(x: f64, range: f64) -> Reading {
         Reading { position: Position::new(Point2::new(x, 5.0)), range, stddev: 0.05 }

@@ -1,6 +1,7 @@
 //! Sightings of a tag, averaged by the robot's position.
 
-use super::{Position, Ring, largest_variance};
+use super::position_groups::{Group, Measurement, PositionGroups};
+use super::{Position, Ring};
 use crate::shared::geometry::Point2;
 use nalgebra::{Matrix2, Vector2};
 
@@ -20,49 +21,52 @@ pub struct Sighting {
 /// As with [`ReadingGroups`](super::ReadingGroups), the common errors of the sightings at one position do not average
 /// out: that of the pose and, in proportion to the distance of the tag, that of the heading.
 #[derive(Clone, Debug, Default)]
-pub struct SightingGroups {
-    groups: Vec<Group>,
-    sightings: u32,
+pub struct SightingGroups(PositionGroups<SightingSums>);
+
+/// Weighted sums over sightings.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct SightingSums {
+    /// Position of the tag at the first sighting.
+    first: Point2,
+    /// Of the positions relative to that.
+    offset: Vector2<f64>,
 }
 
-/// Weighted sums over sightings. Positions are relative to the first one, so that sums lose no digits far from the
-/// origin.
-#[derive(Clone, Copy, Debug)]
-struct Group {
-    /// Position of the robot at the first sighting.
-    robot: Point2,
-    /// Position of the tag at the first sighting.
-    anchor: Point2,
-    weight: f64,
-    offset: Vector2<f64>,
-    pose_covariance: Matrix2<f64>,
+impl Measurement for Sighting {
+    type Sums = SightingSums;
+
+    fn position(&self) -> &Position {
+        &self.position
+    }
+
+    fn stddev(&self) -> f64 {
+        self.stddev
+    }
+
+    fn no_sums(&self) -> SightingSums {
+        SightingSums { first: self.seen, offset: Vector2::zeros() }
+    }
+
+    fn add_to(&self, sums: &mut SightingSums, weight: f64) {
+        sums.offset += (self.seen - sums.first) * weight;
+    }
+
+    /// All sightings at one position are averaged.
+    fn agrees(&self, _: &Group<SightingSums>, _: f64) -> bool {
+        true
+    }
 }
 
 impl SightingGroups {
     /// Adds a sighting. The robot is at a new position when it is `min_travel` metres or more away from the start of
     /// the last one.
     pub fn add(&mut self, sighting: &Sighting, min_travel: f64) {
-        self.sightings = self.sightings.saturating_add(1);
-        let Sighting { position, seen, stddev } = *sighting;
-        let weight = 1.0 / (stddev * stddev);
-        let is_there = |group: &&mut Group| (position.place - group.robot).norm() < min_travel;
-        let group = match self.groups.last_mut().filter(is_there) {
-            Some(group) => group,
-            None => {
-                let (offset, pose_covariance) = (Vector2::zeros(), Matrix2::zeros());
-                self.groups.push(Group { robot: position.place, anchor: seen, weight: 0.0, offset, pose_covariance });
-                let last = self.groups.len() - 1;
-                &mut self.groups[last]
-            }
-        };
-        group.weight += weight;
-        group.offset += (seen - group.anchor) * weight;
-        group.pose_covariance += position.covariance * weight;
+        self.0.add(sighting, min_travel);
     }
 
     /// Number of sightings.
     pub fn sightings(&self) -> u32 {
-        self.sightings
+        self.0.measurements()
     }
 
     /// One ring of radius 0 for each group: the likelihood of a position falls with its distance from the sighting.
@@ -70,7 +74,7 @@ impl SightingGroups {
     /// `pose_stddev`, metres, is a lower bound of the deviation of the pose; `heading_stddev`, radians, that of its
     /// heading.
     pub fn rings(&self, pose_stddev: f64, heading_stddev: f64) -> impl Iterator<Item = Ring> + '_ {
-        self.groups.iter().map(move |group| Ring {
+        self.0.iter().map(move |group| Ring {
             centre: group.seen(),
             radius: 0.0,
             variance: group.variance(pose_stddev, heading_stddev),
@@ -80,27 +84,20 @@ impl SightingGroups {
     /// Common error of the poses, which moves the tag; see
     /// [`ReadingGroups::shared_covariance`](super::ReadingGroups::shared_covariance).
     pub fn shared_covariance(&self, pose_stddev: f64, heading_stddev: f64) -> Matrix2<f64> {
-        let mut sum = Matrix2::zeros();
-        let mut weights = 0.0;
-        for group in &self.groups {
-            let weight = 1.0 / group.variance(pose_stddev, heading_stddev);
-            sum += group.pose_covariance * (weight / group.weight);
-            weights += weight;
-        }
-        if weights > 0.0 { sum / weights } else { sum }
+        self.0.shared_covariance(|group| group.variance(pose_stddev, heading_stddev))
     }
 }
 
-impl Group {
+impl Group<SightingSums> {
+    /// Mean position of the tag.
     fn seen(&self) -> Point2 {
-        self.anchor + self.offset / self.weight
+        self.sums.first + self.sums.offset / self.weight
     }
 
     /// Variance of the sighting along any direction, square metres.
     fn variance(&self, pose_stddev: f64, heading_stddev: f64) -> f64 {
-        let pose_variance = largest_variance(&self.pose_covariance) / self.weight;
-        let across = heading_stddev * (self.seen() - self.robot).norm();
-        1.0 / self.weight + pose_variance.max(pose_stddev * pose_stddev) + across * across
+        let across = heading_stddev * (self.seen() - self.anchor).norm();
+        1.0 / self.weight + self.pose_variance(pose_stddev) + across * across
     }
 }
 
