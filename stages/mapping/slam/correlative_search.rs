@@ -2,7 +2,7 @@
 
 use super::likelihood_field::{CELL, LEVELS, LikelihoodField};
 use crate::shared::geometry::{Point2, Pose2, pose, wrap_angle};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// What is known of a pose before the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,13 +37,45 @@ pub(super) struct Excluded {
     pub(super) turn: f64,
 }
 
-/// Moves of one rotation of the scan: a square of cells.
+/// The poses that are searched: translations by cells of the field, and rotations, each relative to the mean.
+struct Window {
+    mean: Pose2,
+    /// Half of it along x and y, cells.
+    half: [i32; 2],
+    rotations: Vec<Rotation>,
+}
+
+/// The scan in one rotation.
+struct Rotation {
+    /// Turn from the mean, radians.
+    turn: f64,
+    /// Cells of the points, without translation from the mean.
+    cells: Vec<[i32; 2]>,
+}
+
+/// Scores the nodes of the search tree.
+struct Scorer<'a> {
+    field: &'a LikelihoodField,
+    window: &'a Window,
+    prior: &'a PosePrior,
+    /// Information of the prior on the yaw, whatever the translation is.
+    information_of_turn: f64,
+    /// Score of each unit of the field.
+    scale: f64,
+    /// Least sum of the field that counts.
+    least: u32,
+}
+
+/// A node of the search tree: one rotation, and a square of translations.
 #[derive(Clone, Copy)]
-struct Branch {
+struct Node {
+    /// Index of the rotation.
     rotation: usize,
+    /// The square has a side of two to this power, cells.
     level: usize,
-    /// Least move, cells.
+    /// Least translation, cells.
     offset: [i32; 2],
+    /// The score of its poses is no higher; at level 0 it is this.
     bound: f64,
 }
 
@@ -62,88 +94,132 @@ pub(super) fn search(
     if points.is_empty() {
         return None;
     }
-    let farthest = points.iter().map(|point| point.coords.norm()).fold(CELL, f64::max);
-    let step = (CELL / farthest).max(0.004);
-    let turns = (prior.window[2] / step).ceil() as i32;
-    let mean = prior.mean;
-    let yaw = mean.rotation.angle();
-    let rotated: Vec<(f64, Vec<[i32; 2]>)> = (-turns..=turns)
-        .map(|turn| {
-            let turn = f64::from(turn) * step;
-            let at = pose(mean.translation.x, mean.translation.y, yaw + turn);
-            (turn, points.iter().map(|point| field.cell(&(at * point))).collect())
-        })
-        .collect();
-    let half = [0, 1].map(|axis| (prior.window[axis] / CELL).ceil() as i32);
-    let scale = gain / 255.0;
-    let of_turn = prior.information_of_turn();
-    let least = (least * 255.0 * points.len() as f64).ceil() as u32;
-    let bound = |rotation: usize, level: usize, offset: [i32; 2]| {
-        let (turn, cells) = &rotated[rotation];
-        let deviation = match level {
-            0 => {
-                let by = Vector3::new(f64::from(offset[0]) * CELL, f64::from(offset[1]) * CELL, *turn);
-                by.dot(&(prior.information * by))
-            }
-            // The square has a move that fits the turn best, at most.
-            _ => of_turn * turn * turn,
-        };
-        let sum = field.sum(level, cells, offset);
-        if sum < least { f64::NEG_INFINITY } else { scale * f64::from(sum) - 0.5 * deviation }
+    let window = Window::new(field, points, prior);
+    let scorer = Scorer {
+        field,
+        window: &window,
+        prior,
+        information_of_turn: prior.information_of_turn(),
+        scale: gain / 255.0,
+        least: (least * 255.0 * points.len() as f64).ceil() as u32,
     };
-    let is_excluded = |node: &Branch| {
-        excluded.is_some_and(|excluded| {
-            let place = mean.translation.vector + nalgebra::Vector2::from(node.offset.map(f64::from)) * CELL;
-            let turn = wrap_angle(yaw + rotated[node.rotation].0 - excluded.pose.rotation.angle());
-            (place - excluded.pose.translation.vector).norm() < excluded.distance && turn.abs() < excluded.turn
-        })
-    };
-    let widest = half.into_iter().max().unwrap_or(0).max(1);
-    let top = (0..LEVELS).find(|level| 1 << level > widest).unwrap_or(LEVELS - 1);
-    let mut open = Vec::new();
-    for rotation in 0..rotated.len() {
-        for x in (-half[0]..=half[0]).step_by(1 << top) {
-            for y in (-half[1]..=half[1]).step_by(1 << top) {
-                let bound = bound(rotation, top, [x, y]);
-                if bound > f64::NEG_INFINITY {
-                    open.push(Branch { rotation, level: top, offset: [x, y], bound });
-                }
-            }
-        }
-    }
-    // Depth first, the best last; ties in the order of the window, whatever the sort does.
-    open.sort_by(|a, b| a.bound.total_cmp(&b.bound));
-    let mut best: Option<Branch> = None;
+    let best = branch_and_bound(&window, &scorer, excluded)?;
+    let Rotation { turn, cells } = &window.rotations[best.rotation];
+    let [x, y] = best.offset.map(|cells| f64::from(cells) * CELL);
+    let sum = f64::from(field.sum(0, cells, best.offset));
+    let mean = window.mean;
+    Some(FoundPose {
+        pose: pose(mean.translation.x + x, mean.translation.y + y, mean.rotation.angle() + turn),
+        response: sum / (255.0 * points.len() as f64),
+        score: best.bound,
+    })
+}
+
+/// The node of one pose with the highest score. Squares are searched depth first, the best first; those that cannot
+/// exceed the best pose so far are left out.
+fn branch_and_bound(window: &Window, scorer: &Scorer<'_>, excluded: Option<&Excluded>) -> Option<Node> {
+    let mut open = scorer.roots();
+    let mut best: Option<Node> = None;
     while let Some(node) = open.pop() {
         if best.is_some_and(|best| best.bound >= node.bound) {
             continue;
         }
-        if node.level == 0 {
-            if !is_excluded(&node) {
-                best = Some(node);
-            }
-            continue;
+        if node.level > 0 {
+            let possible = |part: &Node| window.contains(part.offset) && part.bound > f64::NEG_INFINITY;
+            open.extend(scorer.parts(&node).into_iter().filter(possible));
+        } else if !excluded.is_some_and(|excluded| window.is_excluded(&node, excluded)) {
+            best = Some(node);
         }
+    }
+    best
+}
+
+impl Window {
+    fn new(field: &LikelihoodField, points: &[Point2], prior: &PosePrior) -> Self {
+        let farthest = points.iter().map(|point| point.coords.norm()).fold(CELL, f64::max);
+        let step = (CELL / farthest).max(0.004);
+        let turns = (prior.window[2] / step).ceil() as i32;
+        let mean = prior.mean;
+        let yaw = mean.rotation.angle();
+        let rotation = |turn: i32| {
+            let turn = f64::from(turn) * step;
+            let at = pose(mean.translation.x, mean.translation.y, yaw + turn);
+            Rotation { turn, cells: points.iter().map(|point| field.cell(&(at * point))).collect() }
+        };
+        let half = [0, 1].map(|axis| (prior.window[axis] / CELL).ceil() as i32);
+        Self { mean, half, rotations: (-turns..=turns).map(rotation).collect() }
+    }
+
+    /// The least level at which a square is wider than half the window, of those that the field has.
+    fn top_level(&self) -> usize {
+        let widest = self.half.into_iter().max().unwrap_or(0).max(1);
+        (0..LEVELS).find(|level| 1 << level > widest).unwrap_or(LEVELS - 1)
+    }
+
+    /// Whether a square with this least translation reaches into the window.
+    fn contains(&self, offset: [i32; 2]) -> bool {
+        offset[0] <= self.half[0] && offset[1] <= self.half[1]
+    }
+
+    /// Whether a node of one pose is near an excluded pose.
+    fn is_excluded(&self, node: &Node, excluded: &Excluded) -> bool {
+        let place = self.mean.translation.vector + Vector2::from(node.offset.map(f64::from)) * CELL;
+        let yaw = self.mean.rotation.angle() + self.rotations[node.rotation].turn;
+        let turn = wrap_angle(yaw - excluded.pose.rotation.angle());
+        (place - excluded.pose.translation.vector).norm() < excluded.distance && turn.abs() < excluded.turn
+    }
+}
+
+impl Scorer<'_> {
+    fn node(&self, rotation: usize, level: usize, offset: [i32; 2]) -> Node {
+        let Rotation { turn, cells } = &self.window.rotations[rotation];
+        let squared_deviation = match level {
+            0 => self.squared_deviation(*turn, offset),
+            // The square has a translation that fits the turn best, at most.
+            _ => self.information_of_turn * turn * turn,
+        };
+        let sum = self.field.sum(level, cells, offset);
+        let bound = match sum < self.least {
+            true => f64::NEG_INFINITY,
+            false => self.scale * f64::from(sum) - 0.5 * squared_deviation,
+        };
+        Node { rotation, level, offset, bound }
+    }
+
+    /// Squared deviation of a pose from the prior, in variances.
+    fn squared_deviation(&self, turn: f64, offset: [i32; 2]) -> f64 {
+        let by = Vector3::new(f64::from(offset[0]) * CELL, f64::from(offset[1]) * CELL, turn);
+        by.dot(&(self.prior.information * by))
+    }
+
+    /// The nodes that cover the window, the best last; equals in the order of the window.
+    fn roots(&self) -> Vec<Node> {
+        let (level, [half_x, half_y]) = (self.window.top_level(), self.window.half);
+        let mut roots = Vec::new();
+        for rotation in 0..self.window.rotations.len() {
+            for x in (-half_x..=half_x).step_by(1 << level) {
+                for y in (-half_y..=half_y).step_by(1 << level) {
+                    let node = self.node(rotation, level, [x, y]);
+                    if node.bound > f64::NEG_INFINITY {
+                        roots.push(node);
+                    }
+                }
+            }
+        }
+        roots.sort_by(|a, b| a.bound.total_cmp(&b.bound));
+        roots
+    }
+
+    /// The four quarters of a node, the best last.
+    fn parts(&self, node: &Node) -> [Node; 4] {
         let level = node.level - 1;
         let side = 1 << level;
-        let mut parts = [[0, 0], [side, 0], [0, side], [side, side]].map(|[right, up]| {
-            let offset = [node.offset[0] + right, node.offset[1] + up];
-            Branch { rotation: node.rotation, level, offset, bound: bound(node.rotation, level, offset) }
-        });
+        let [x, y] = node.offset;
+        let mut parts = [[x, y], [x + side, y], [x, y + side], [x + side, y + side]]
+            .map(|offset| self.node(node.rotation, level, offset));
         parts.sort_by(|a, b| a.bound.total_cmp(&b.bound));
-        let is_inside =
-            |node: &Branch| node.offset[0] <= half[0] && node.offset[1] <= half[1] && node.bound > f64::NEG_INFINITY;
-        open.extend(parts.into_iter().filter(is_inside));
+        parts
     }
-    let best = best?;
-    let (turn, cells) = &rotated[best.rotation];
-    let [x, y] = best.offset.map(|cells| f64::from(cells) * CELL);
-    let sum = f64::from(field.sum(0, cells, best.offset));
-    Some(FoundPose {
-        pose: pose(mean.translation.x + x, mean.translation.y + y, yaw + turn),
-        response: sum / (255.0 * points.len() as f64),
-        score: best.bound,
-    })
 }
 
 impl PosePrior {
@@ -159,7 +235,6 @@ impl PosePrior {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector2;
 
     /// The corner of a room, with a niche.
     fn room() -> Vec<Point2> {
