@@ -2,7 +2,7 @@
 
 use super::graph::Edge;
 use super::uncertain::{UncertainPose, error_vector};
-use crate::shared::geometry::{Pose2, pose, quarter_turn, wrap_angle};
+use crate::shared::geometry::{Pose2, pose, relative_pose, wrap_angle};
 use nalgebra::{DMatrix, DVector, Dyn, Matrix3, OMatrix, U3, Vector3};
 
 /// The most Gauss-Newton steps.
@@ -78,13 +78,7 @@ fn linearize(edge: &Edge, pose_a: &Pose2, pose_b: &Pose2) -> (Vector3<f64>, Matr
     let predicted = error_vector(&(pose_a.inverse() * pose_b));
     let mut error = predicted - error_vector(&edge.transform_a_b.pose);
     error.z = wrap_angle(error.z);
-    let back = pose_a.rotation.inverse();
-    let turn = back.to_rotation_matrix().into_inner();
-    let lever = -(back * quarter_turn(&(pose_b.translation.vector - pose_a.translation.vector)));
-    let mut by_b = Matrix3::identity();
-    by_b.fixed_view_mut::<2, 2>(0, 0).copy_from(&turn);
-    let mut by_a = -by_b;
-    by_a.fixed_view_mut::<2, 1>(0, 2).copy_from(&lever);
+    let [by_a, by_b] = relative_pose::derivatives(pose_a, pose_b);
     (error, by_a, by_b)
 }
 

@@ -64,7 +64,7 @@ fn more_probable<'a>(first: LandmarkGraph<'a>, second: LandmarkGraph<'a>) -> Lan
 /// Whether an estimate, after it is settled, is more probable than another one by the readings, with the same noise.
 /// `prior` is the logarithm of how much more probable it is before them.
 fn is_more_probable(graph: &mut LandmarkGraph<'_>, than: &LandmarkGraph<'_>, prior: f64) -> bool {
-    let found = graph.settle().then(|| graph.evidence()).flatten();
+    let found = graph.optimize().then(|| graph.evidence()).flatten();
     found.is_some_and(|found| than.evidence().is_none_or(|other| found + prior > other))
 }
 
@@ -93,13 +93,13 @@ fn along_the_drive<'a>(
     for part in 1..=PARTS {
         graph.extend((keyframes * part).div_ceil(PARTS));
         place_tags(&mut graph, parameters, &mut searched_with);
-        if graph.tags.iter().any(Option::is_some) && !graph.settle() {
+        if graph.tags.iter().any(Option::is_some) && !graph.optimize() {
             return None;
         }
     }
     for _ in 0..2 {
         graph.estimate_noise();
-        graph.settle().then_some(())?;
+        graph.optimize().then_some(())?;
     }
     graph.tags.iter().any(Option::is_some).then_some(graph)
 }
@@ -138,6 +138,6 @@ fn with_best_drift(mut graph: LandmarkGraph<'_>) -> LandmarkGraph<'_> {
         better.estimate_noise();
         graph = better;
     }
-    graph.settle();
+    graph.optimize();
     graph
 }

@@ -41,8 +41,13 @@ pub(super) struct LandmarkGraph<'a> {
 /// Normal equations, whose unknowns are the keyframes, the tags, the calibration and the systematic errors of the
 /// odometry, in this order: then the factor has no more than a column of tags for each keyframe.
 struct LandmarkEquations {
+    /// Number of the keyframes, and of the tags.
+    poses: usize,
+    tags: usize,
+    /// Blocks below the diagonal.
     columns: Columns,
-    right: Vec<Vector3<f64>>,
+    diagonal: Vec<Matrix3<f64>>,
+    negative_gradient: Vec<Vector3<f64>>,
 }
 
 impl<'a> LandmarkGraph<'a> {
@@ -137,86 +142,100 @@ impl<'a> LandmarkGraph<'a> {
     }
 
     fn equations(&self) -> LandmarkEquations {
-        let (poses, tags) = (self.poses.len(), self.tags.len());
-        let calibration = poses + tags;
-        let systematic = calibration + 1;
-        let mut right = vec![Vector3::zeros(); systematic + 1];
-        let mut columns: Columns = vec![Vec::new(); systematic + 1];
-        let mut diagonal = vec![Matrix3::zeros(); systematic + 1];
-        if let Some(first) = diagonal.first_mut() {
-            *first = Matrix3::identity() * FIXED;
-        }
-        for to in 1..poses {
+        let mut equations = LandmarkEquations::of_fixed_frame(self.poses.len(), self.tags.len());
+        self.add_odometry(&mut equations);
+        self.add_readings(&mut equations);
+        self.add_priors(&mut equations);
+        equations
+    }
+
+    fn add_odometry(&self, equations: &mut LandmarkEquations) {
+        let systematic = equations.systematic();
+        for to in 1..self.poses.len() {
             let Some(information) = self.step_information(to) else { continue };
             let (residual, by_systematic) = self.step_residual(to);
             let [by_from, by_to] = relative_pose::derivatives(&self.poses[to - 1], &self.poses[to]);
             let parts = [(to - 1, by_from), (to, by_to), (systematic, by_systematic)];
             for (row, by_row) in &parts {
                 let weighted = by_row.transpose() * information;
-                right[*row] -= weighted * residual;
-                diagonal[*row] += weighted * by_row;
+                equations.negative_gradient[*row] -= weighted * residual;
+                equations.diagonal[*row] += weighted * by_row;
                 for (column, by_column) in parts.iter().filter(|(column, _)| column < row) {
-                    columns[*column].push((*row, weighted * by_column));
+                    equations.columns[*column].push((*row, weighted * by_column));
                 }
             }
         }
+    }
+
+    fn add_readings(&self, equations: &mut LandmarkEquations) {
+        let tags = self.tags.len();
+        let calibration = equations.calibration();
         let mut with_calibration = vec![Matrix3::zeros(); tags];
         for of_one in self.readings().chunk_by(|a, b| a.keyframe == b.keyframe) {
             let keyframe = of_one[0].keyframe;
+            // The last one is with the calibration.
             let mut with_tags = vec![Matrix3::zeros(); tags + 1];
             for reading in of_one {
                 let noise = self.noise(reading);
                 let Some(rows) = self.rows(reading, noise) else { continue };
                 let weight = weight(rows.squared().sqrt()) / noise.correlated;
+                let (number, tag) = (reading.tag, equations.tag(reading.tag));
+                let LandmarkEquations { diagonal, negative_gradient, .. } = &mut *equations;
                 for row in rows.iter() {
                     let by_tag = Vector3::new(row.by_tag.x, row.by_tag.y, 0.0);
                     let by_calibration = Vector3::new(row.by_calibration.x, row.by_calibration.y, 0.0);
-                    let tag = reading.tag;
                     diagonal[keyframe] += weight * row.by_pose * row.by_pose.transpose();
-                    diagonal[poses + tag] += weight * by_tag * by_tag.transpose();
+                    diagonal[tag] += weight * by_tag * by_tag.transpose();
                     diagonal[calibration] += weight * by_calibration * by_calibration.transpose();
-                    with_tags[tag] += weight * by_tag * row.by_pose.transpose();
+                    with_tags[number] += weight * by_tag * row.by_pose.transpose();
                     with_tags[tags] += weight * by_calibration * row.by_pose.transpose();
-                    with_calibration[tag] += weight * by_calibration * by_tag.transpose();
-                    right[keyframe] -= weight * row.residual * row.by_pose;
-                    right[poses + tag] -= weight * row.residual * by_tag;
-                    right[calibration] -= weight * row.residual * by_calibration;
+                    with_calibration[number] += weight * by_calibration * by_tag.transpose();
+                    negative_gradient[keyframe] -= weight * row.residual * row.by_pose;
+                    negative_gradient[tag] -= weight * row.residual * by_tag;
+                    negative_gradient[calibration] -= weight * row.residual * by_calibration;
                 }
             }
             let below = with_tags.into_iter().enumerate().filter(|(_, block)| *block != Matrix3::zeros());
-            columns[keyframe].extend(below.map(|(tag, block)| (poses + tag, block)));
+            let below: Vec<_> = below.map(|(number, block)| (equations.tag(number), block)).collect();
+            equations.columns[keyframe].extend(below);
         }
-        for (tag, block) in with_calibration.into_iter().enumerate() {
-            columns[poses + tag].push((calibration, block));
+        for (number, block) in with_calibration.into_iter().enumerate() {
+            let tag = equations.tag(number);
+            equations.columns[tag].push((calibration, block));
+        }
+    }
+
+    fn add_priors(&self, equations: &mut LandmarkEquations) {
+        for (number, position) in self.tags.iter().enumerate() {
+            let tag = equations.tag(number);
             // A position has two parts, and an unknown one none.
-            diagonal[poses + tag][(2, 2)] = 1.0;
-            if self.tags[tag].is_none() {
-                diagonal[poses + tag] = Matrix3::identity();
+            match position {
+                Some(_) => equations.diagonal[tag][(2, 2)] = 1.0,
+                None => equations.diagonal[tag] = Matrix3::identity(),
             }
         }
+        let calibration = equations.calibration();
         let prior = self.calibration_prior();
-        diagonal[calibration] += Matrix3::from_diagonal(&Vector3::new(prior.x, prior.y, 1.0));
-        right[calibration] -= Vector3::new(prior.x * self.calibration.x, prior.y * self.calibration.y, 0.0);
+        equations.diagonal[calibration] += Matrix3::from_diagonal(&Vector3::new(prior.x, prior.y, 1.0));
+        equations.negative_gradient[calibration] -=
+            Vector3::new(prior.x * self.calibration.x, prior.y * self.calibration.y, 0.0);
+        let systematic = equations.systematic();
         let prior = self.drift.systematic_information();
-        diagonal[systematic] += Matrix3::from_diagonal(&prior);
-        right[systematic] -= prior.component_mul(&self.systematic);
-        for (place, block) in diagonal.into_iter().enumerate() {
-            columns[place].push((place, block));
-        }
-        LandmarkEquations { columns, right }
+        equations.diagonal[systematic] += Matrix3::from_diagonal(&prior);
+        equations.negative_gradient[systematic] -= prior.component_mul(&self.systematic);
     }
 
     /// Moves everything to the most probable estimate (Levenberg and Marquardt). Returns whether there is one.
-    pub(super) fn settle(&mut self) -> bool {
+    pub(super) fn optimize(&mut self) -> bool {
         let (mut damping, mut now) = (FIRST_DAMPING, self.cost());
         let mut equations = self.equations();
         for _ in 0..MAX_STEPS {
-            let Some(moves) = equations.solved(damping) else { return false };
-            let (moved, longest) = self.moved(&moves);
-            let then = moved.cost();
+            let Some(step) = equations.solved(damping) else { return false };
+            let (stepped, longest) = self.stepped(&step);
+            let then = stepped.cost();
             if then.is_finite() && then <= now {
                 let gain = now - then;
-                *self = moved;
+                *self = stepped;
                 now = then;
                 damping = (damping / DAMPING_FACTOR).max(FIRST_DAMPING);
                 if longest < LEAST_STEP || gain < LEAST_GAIN {
@@ -233,25 +252,25 @@ impl<'a> LandmarkGraph<'a> {
         now.is_finite()
     }
 
-    /// The estimate after a step, and its longest move.
-    fn moved(&self, moves: &[Vector3<f64>]) -> (Self, f64) {
-        let mut moved = self.clone();
-        let longest = moves.iter().map(|step| step.amax()).fold(0.0, f64::max);
-        let (of_poses, rest) = moves.split_at(self.poses.len());
-        for (pose, step) in moved.poses.iter_mut().zip(of_poses).skip(1) {
+    /// The estimate after a step, and the longest part of the step.
+    fn stepped(&self, step: &[Vector3<f64>]) -> (Self, f64) {
+        let mut stepped = self.clone();
+        let longest = step.iter().map(|step| step.amax()).fold(0.0, f64::max);
+        let (of_poses, rest) = step.split_at(self.poses.len());
+        for (pose, step) in stepped.poses.iter_mut().zip(of_poses).skip(1) {
             pose.translation.vector += step.xy();
             pose.rotation *= UnitComplex::new(step.z);
         }
-        for (tag, step) in moved.tags.iter_mut().zip(rest) {
+        for (tag, step) in stepped.tags.iter_mut().zip(rest) {
             if let Some(tag) = tag {
                 *tag += step.xy();
             }
         }
         if let [.., calibration, systematic] = rest {
-            moved.calibration += calibration.xy();
-            moved.systematic += systematic;
+            stepped.calibration += calibration.xy();
+            stepped.systematic += systematic;
         }
-        (moved, longest)
+        (stepped, longest)
     }
 
     /// Estimates the noise of each tag's readings from their residuals.
@@ -269,7 +288,7 @@ impl<'a> LandmarkGraph<'a> {
     }
 
     fn factor(&self) -> Option<BlockCholesky> {
-        factor(&self.equations().columns)
+        self.equations().factor(0.0)
     }
 
     /// Logarithm of the probability of all readings and steps under the assumed drift, whatever the poses and the tags
@@ -306,17 +325,49 @@ impl<'a> LandmarkGraph<'a> {
 }
 
 impl LandmarkEquations {
+    /// Equations of nothing but the first keyframe, which is fixed.
+    fn of_fixed_frame(poses: usize, tags: usize) -> Self {
+        let count = poses + tags + 2;
+        let mut diagonal = vec![Matrix3::zeros(); count];
+        diagonal[0] = Matrix3::identity() * FIXED;
+        Self {
+            poses,
+            tags,
+            columns: vec![Vec::new(); count],
+            diagonal,
+            negative_gradient: vec![Vector3::zeros(); count],
+        }
+    }
+
+    /// Places of the unknowns.
+    fn tag(&self, number: usize) -> usize {
+        self.poses + number
+    }
+
+    fn calibration(&self) -> usize {
+        self.poses + self.tags
+    }
+
+    fn systematic(&self) -> usize {
+        self.calibration() + 1
+    }
+
+    /// The factor with the diagonal larger by a share. `None` if it has none.
+    fn factor(&self, damping: f64) -> Option<BlockCholesky> {
+        let mut columns = self.columns.clone();
+        for (place, (column, diagonal)) in columns.iter_mut().zip(&self.diagonal).enumerate() {
+            let mut damped = *diagonal;
+            for axis in 0..3 {
+                damped[(axis, axis)] *= 1.0 + damping;
+            }
+            column.push((place, damped));
+        }
+        factor(&columns)
+    }
+
     /// The step that they ask for, damped. `None` if they have no solution.
     fn solved(&self, damping: f64) -> Option<Vec<Vector3<f64>>> {
-        let mut columns = self.columns.clone();
-        for (place, column) in columns.iter_mut().enumerate() {
-            for (_, block) in column.iter_mut().filter(|(row, _)| *row == place) {
-                for axis in 0..3 {
-                    block[(axis, axis)] *= 1.0 + damping;
-                }
-            }
-        }
-        let moves = factor(&columns)?.solve(&self.right);
-        moves.iter().all(|step| step.iter().all(|value| value.is_finite())).then_some(moves)
+        let step = self.factor(damping)?.solve(&self.negative_gradient);
+        step.iter().all(|step| step.iter().all(|value| value.is_finite())).then_some(step)
     }
 }
