@@ -85,6 +85,14 @@ pub enum ReadError {
         /// The first damage that was found.
         damage: super::Damage,
     },
+    /// The file has no message of a channel that can be kept.
+    #[error("{}: it has no message that can be read: the descriptions of its channels are larger than the 64 MiB that are kept, and {count} were left out", .path.display())]
+    ManyDefinitions {
+        /// The file.
+        path: PathBuf,
+        /// The number of channels that were left out.
+        count: usize,
+    },
     /// A folder is not a bag.
     #[error("{}: the folder has neither a metadata.yaml with content nor an .mcap or .db3 file; {advice}", .path.display())]
     NotABag {

@@ -72,6 +72,9 @@ impl LogFile {
         match loss {
             Some(damage) if layout.blocks.is_empty() => Err(match sqlite::write_ahead_log(&path) {
                 Some(journal) if matches!(storage, Storage::Sqlite(_)) => ReadError::OnlyJournal { path, journal },
+                _ if let Damage::ManyDefinitions { count } = damage => {
+                    ReadError::ManyDefinitions { path, count: *count }
+                }
                 _ => ReadError::NothingLeft { path, damage: damage.clone() },
             }),
             _ => Ok(Self { path, size, is_compressed, is_map, later: 0, storage, layout }),

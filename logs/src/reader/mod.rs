@@ -27,6 +27,7 @@ mod bytes;
 mod chunk;
 mod compressed;
 mod damage;
+mod definition_records;
 mod definitions;
 mod error;
 mod file;

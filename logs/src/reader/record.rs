@@ -2,6 +2,7 @@
 
 use super::damage::ChunkFault;
 use mcap::records::op;
+use std::borrow::Cow;
 
 /// The length of a record's header: the opcode and the length of the body.
 pub(crate) const HEAD: usize = 9;
@@ -158,8 +159,12 @@ impl<'a> Fields<'a> {
 
     /// A string with its length in front. Invalid UTF-8 is replaced.
     pub(crate) fn text(&mut self) -> Option<String> {
-        let length = usize::try_from(self.u32()?).ok()?;
-        self.bytes(length).map(|bytes| String::from_utf8_lossy(bytes).into_owned())
+        self.str().map(Cow::into_owned)
+    }
+
+    /// The same, copied only where it is invalid.
+    pub(crate) fn str(&mut self) -> Option<Cow<'a, str>> {
+        self.block().map(|bytes| String::from_utf8_lossy(bytes.0))
     }
 
     /// A nested block of fields with its length in front.

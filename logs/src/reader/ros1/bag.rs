@@ -6,7 +6,7 @@ use crate::reader::block::{Block, Records};
 use crate::reader::bytes::{FileBytes, Window};
 use crate::reader::chunk::{decompress_bz2, decompress_lz4};
 use crate::reader::damage::{ChunkFault, Damage, LARGEST};
-use crate::reader::definitions::MOST_CHANNELS;
+use crate::reader::definitions::{MOST_BYTES, MOST_CHANNELS};
 use crate::reader::layout::Layout;
 use crate::reader::record::{Fields, push_message};
 use gridweave_runtime::message::Channel;
@@ -113,6 +113,12 @@ impl Walk {
         }
         // Checked above.
         let Ok(channel) = u16::try_from(self.connections.len() + 1) else { return };
+        self.connections.insert(number, channel);
+        // Its texts are copied only if they may fit.
+        if data.len() > MOST_BYTES {
+            self.layout.definitions.refuse(channel);
+            return;
+        }
         let latching = data_header.text("latching").unwrap_or_default();
         let description = Channel {
             topic: header.text("topic").or_else(|| data_header.text("topic")).unwrap_or_default(),
@@ -123,7 +129,6 @@ impl Walk {
             metadata: BTreeMap::from([(LATCHING.to_owned(), latching)]),
         };
         self.layout.definitions.insert(channel, description);
-        self.connections.insert(number, channel);
     }
 
     /// Scans chunks whose time span is unknown, or all chunks if some may contain connections that are described

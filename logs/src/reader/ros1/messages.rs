@@ -5,13 +5,14 @@ use crate::dynamic::{Recoder, Schema};
 use crate::reader::damage::{ChunkFault, LARGEST};
 use crate::reader::definitions::Definitions;
 use crate::reader::record::copy_messages;
+use std::sync::Arc;
 
 /// A ROS 1 message type as ROS 2 knows it.
 pub(crate) struct Converted {
     pub(crate) type_name: String,
     pub(crate) definition: String,
     /// Converts messages.
-    pub(crate) recoder: Recoder,
+    pub(crate) recoder: Arc<Recoder>,
 }
 
 impl Converted {
@@ -21,7 +22,7 @@ impl Converted {
             return None;
         }
         let (type_name, definition) = (type_name(name), translate(definition));
-        let recoder = Schema::parse(&type_name, &definition).ok().and_then(Recoder::new)?;
+        let recoder = Schema::parse(&type_name, &definition).ok().and_then(Recoder::new).map(Arc::new)?;
         Some(Self { type_name, definition, recoder })
     }
 }
