@@ -1,9 +1,9 @@
 //! Reading a topological map from a JSON file.
 
+use gridweave_runtime::input_file;
 use gridweave_runtime::ros::{Point, TopologicalMap, TopologicalNode, TopologicalPath, TopologyError};
 use serde::Deserialize;
-use std::fs::File;
-use std::io::{self, BufReader};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// The error when a file cannot be read as a topological map.
@@ -90,9 +90,9 @@ fn certain() -> f64 {
 /// is out of range.
 pub fn load(path: &Path) -> Result<TopologicalMap, TopologyFileError> {
     let unreadable = |error| TopologyFileError::Unreadable { path: path.to_owned(), error };
-    let file = File::open(path).map_err(unreadable)?;
-    let map: JsonMap = serde_json::from_reader(BufReader::new(file))
-        .map_err(|error| TopologyFileError::Malformed { path: path.to_owned(), error })?;
+    let text = input_file::read_text(path).map_err(unreadable)?;
+    let map: JsonMap =
+        serde_json::from_str(&text).map_err(|error| TopologyFileError::Malformed { path: path.to_owned(), error })?;
     let mut paths = Vec::with_capacity(map.paths.len());
     for (number, of) in map.paths.iter().enumerate() {
         let node = |node: u32| {

@@ -49,3 +49,13 @@ fn invalid_topological_maps_are_reported_with_their_file() {
     assert!(run(&[]).unwrap_err().to_string().contains("no input file"));
     assert!(load("/nowhere/a.json".as_ref()).unwrap_err().to_string().contains("cannot read /nowhere/a.json"));
 }
+
+#[test]
+fn a_pipe_is_an_error_at_once() {
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe.json");
+    mknodat(CWD, &pipe, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+    let error = load(&pipe).unwrap_err().to_string();
+    assert!(error.contains("pipe.json: it is no regular file"), "{error}");
+}
