@@ -14,12 +14,18 @@ pub(crate) const OUTPUT_IS_CLOSED: &str = "the output is being closed";
 /// Signals that end a program at once by default, other than SIGINT, SIGTERM and SIGHUP.
 const OTHERS: [Signal; 4] = [Signal::SIGQUIT, Signal::SIGUSR1, Signal::SIGUSR2, Signal::SIGALRM];
 
+/// Makes a write to a file that exceeds its size limit (`ulimit -f`) an error instead of the end of the program. Must be
+/// called before other threads are started.
+pub(crate) fn fail_on_large_files() {
+    if let Err(error) = SigSet::from(Signal::SIGXFSZ).thread_block() {
+        tracing::warn!("a file that exceeds its size limit will end the program: {error}");
+    }
+}
+
 /// Blocks the signals that would end the program at once, until [`stop_on_interrupt`] is called. Must be called before
 /// other threads are started.
 pub(crate) fn hold_back() {
-    let mut signals: SigSet = OTHERS.into_iter().collect();
-    // A file that exceeds its size limit is an error of the write.
-    signals.add(Signal::SIGXFSZ);
+    let signals: SigSet = OTHERS.into_iter().collect();
     if let Err(error) = signals.thread_block() {
         tracing::warn!("signals will end the program without closing the output: {error}");
     }

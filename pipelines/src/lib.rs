@@ -70,6 +70,7 @@ pub fn command_line(
     verbs: &[Verb],
     on_warning: fn(&str, &str),
 ) -> u8 {
+    interrupt::fail_on_large_files();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let registry = shipped::registry(kinds);
     if arguments.iter().any(|argument| argument == "--ros-args") {

@@ -4,15 +4,16 @@
 //! A limit of the size of files (`ulimit -f`) makes the write fail that crosses it, as on a full disk. It is raised
 //! block by block until all fits.
 
-use crate::support::{Ended, LogBuilder, SMALL_BUILDING, TestMap, gridweave_program, start_program};
+use crate::support::{Ended, LogBuilder, SMALL_BUILDING, TestMap, gridweave, gridweave_program, start_program};
 use gridweave_logs::map_file::{self, GridMap};
+use gridweave_logs::reader::LogFile;
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
 /// Runs `gridweave` with so many blocks of 512 bytes as the limit of each file that it writes.
 fn run_limited(folder: &Path, blocks: usize, args: &[&str]) -> Ended {
-    let limited = "trap '' XFSZ; ulimit -f \"$1\"; shift; exec \"$@\"";
+    let limited = "ulimit -f \"$1\"; shift; exec \"$@\"";
     let (blocks, program) = (blocks.to_string(), gridweave_program().to_str().unwrap());
     let args = [&["-c", limited, "sh", &blocks, program], args].concat();
     start_program("sh".as_ref(), folder, &args, &[]).wait()
@@ -43,6 +44,39 @@ fn fail_at_each_block(folder: &Path, args: &[&str], outputs: &[&str], most: usiz
         }
     }
     panic!("{most} blocks are not enough");
+}
+
+#[test]
+fn a_log_whose_writing_fails_at_any_block_leaves_the_earlier_one() {
+    let folder = TempDir::new().unwrap();
+    let input = folder.path().join("input.mcap");
+    let mut log = LogBuilder::new(&input);
+    for number in 0..3 {
+        // Bytes that do not compress.
+        let bytes: Vec<u8> =
+            (0..1500_u64).map(|at| ((at + 7919 * number).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 56) as u8).collect();
+        log.raw(number as f64, "/other", "std_msgs/msg/String", &bytes);
+    }
+    log.finish();
+    fail_at_each_block(folder.path(), &["convert", "input.mcap", "-o", "output.mcap"], &["output.mcap"], 60);
+    assert!(LogFile::open(folder.path().join("output.mcap")).unwrap().damage().is_empty());
+}
+
+#[test]
+fn a_picture_and_a_report_that_are_too_large_leave_the_earlier_ones() {
+    let folder = TempDir::new().unwrap();
+    let TestMap { info, mut cells } = TestMap::filled(60, 50, 0.05, 0);
+    cells[..3 * 60].fill(100);
+    map_file::save(&folder.path().join("a.yaml"), &GridMap { info, cells }).unwrap();
+    gridweave(folder.path(), &["merge", "a.yaml", "a.yaml", "-o", "a.mcap"]);
+    for (args, output) in
+        [(["render", "a.yaml", "-o", "a.svg"], "a.svg"), (["report", "a.mcap", "-o", "a.html"], "a.html")]
+    {
+        fs::write(folder.path().join(output), "earlier").unwrap();
+        run_limited(folder.path(), 1, &args).assert(1, &[output, "ulimit -f"]);
+        assert_eq!(fs::read(folder.path().join(output)).unwrap(), b"earlier");
+        assert!(!folder.path().join(format!("{output}.part")).exists());
+    }
 }
 
 #[test]
