@@ -53,9 +53,10 @@ impl InferredPoses {
             bases: BASES.map(|base| format!("{robot}{base}")).to_vec(),
         };
         self.tf.set_robots(channels.unposed().map(|robot| (robot.to_owned(), ends(robot))).collect());
-        let has_map = |robot: &&str| channels.mapped().chain(channels.scanned()).any(|other| other == *robot);
-        self.mapless = channels.unposed().filter(|robot| !has_map(robot)).map(str::to_owned).collect();
-        let by_tf = channels.scanned().filter(|robot| channels.unposed().any(|unposed| unposed == *robot));
+        let with_map: BTreeSet<&str> = channels.mapped().chain(channels.scanned()).collect();
+        self.mapless = channels.unposed().filter(|robot| !with_map.contains(robot)).map(str::to_owned).collect();
+        let unposed: BTreeSet<&str> = channels.unposed().collect();
+        let by_tf = channels.scanned().filter(|robot| unposed.contains(robot));
         let by_tf = by_tf.filter(|robot| !channels.has_odometry(robot));
         let in_odometry = |robot: &str| PoseFrames { map: format!("{robot}/{ODOMETRY_FRAME}"), ..ends(robot) };
         self.odometry.set_robots(by_tf.map(|robot| (robot.to_owned(), in_odometry(robot))).collect());

@@ -9,11 +9,12 @@ use crate::reader::{SupplementKind, read_attachment, read_metadata};
 use gridweave_runtime::message::{Channel, FixedText, Message};
 use gridweave_runtime::ros::{RosMessage, TFMessage};
 use gridweave_runtime::stage::{Context, InputWire, Output, StageError, match_robot};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
 
 /// A channel of the log.
 struct Lane {
-    channel: Channel,
+    channel: Arc<Channel>,
     /// The number in the log, set with the first message; or why the log cannot hold its messages.
     id: Option<Result<u16, String>>,
     /// The sequence number of the next result.
@@ -61,6 +62,7 @@ pub(super) struct McapSink {
     recorded_pipeline: Option<String>,
     recorded_files: Option<InputHashes>,
     lanes: Vec<Lane>,
+    lane_of: HashMap<Arc<Channel>, usize>,
     /// By wire and number, since each source numbers its channels itself.
     announced: BTreeMap<(usize, u32), Target>,
     /// By wire and topic.
@@ -96,6 +98,7 @@ impl McapSink {
             recorded_pipeline: Some(recorded_pipeline).filter(|text| !text.is_empty()),
             recorded_files: (!recorded_files.is_empty()).then(|| InputHashes::start(recorded_files)),
             lanes: Vec::new(),
+            lane_of: HashMap::new(),
             announced: BTreeMap::new(),
             results: BTreeMap::new(),
         })
@@ -108,13 +111,13 @@ impl McapSink {
 
     /// The lane of a channel; equal channels share one.
     fn lane(&mut self, channel: Channel) -> usize {
-        match self.lanes.iter().position(|lane| lane.channel == channel) {
-            Some(index) => index,
-            None => {
-                self.lanes.push(Lane { channel, id: None, next_sequence: 0 });
-                self.lanes.len() - 1
-            }
+        if let Some(&index) = self.lane_of.get(&channel) {
+            return index;
         }
+        let channel = Arc::new(channel);
+        self.lane_of.insert(Arc::clone(&channel), self.lanes.len());
+        self.lanes.push(Lane { channel, id: None, next_sequence: 0 });
+        self.lanes.len() - 1
     }
 
     /// The lane of a result of a stage.

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 ///
 /// A source announces a channel on a link before its first message, so that a sink can write messages of types that
 /// this program does not know, with all the information of the input log.
-#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Channel {
     /// The topic, as in the input.
     pub topic: String,

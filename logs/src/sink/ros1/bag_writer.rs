@@ -11,7 +11,7 @@ use crate::sink::{Compression, LogOptions, LogWriteError, Outcome};
 use gridweave_runtime::message::Channel;
 use mcap::records::MessageHeader;
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::{self, Write};
 use std::os::unix::fs::FileExt;
@@ -34,13 +34,14 @@ pub(in crate::sink) struct BagWriter {
     length: u64,
     options: LogOptions,
     connections: Vec<Connection>,
+    /// The numbers of the channels.
+    numbers: HashMap<Channel, u16>,
     chunk: OpenChunk,
     chunks: Vec<ChunkInfo>,
 }
 
 /// A topic with messages of one type.
 struct Connection {
-    channel: Channel,
     /// Its record.
     record: Vec<u8>,
     encoder: Ros1Encoder,
@@ -81,6 +82,7 @@ impl BagWriter {
             length: 0,
             options,
             connections: Vec::new(),
+            numbers: HashMap::new(),
             chunk: OpenChunk::default(),
             chunks: Vec::new(),
         };
@@ -97,8 +99,8 @@ impl BagWriter {
     /// The number of a channel. A channel that was added before keeps its number. The inner error says why a bag cannot
     /// hold its messages.
     pub(in crate::sink) fn channel(&mut self, channel: &Channel) -> Result<Result<u16, String>, LogWriteError> {
-        if let Some(number) = self.connections.iter().position(|known| known.channel == *channel) {
-            return self.number(number).map(Ok);
+        if let Some(&number) = self.numbers.get(channel) {
+            return Ok(Ok(number));
         }
         let number = self.number(self.connections.len())?;
         let schema = match channel.schema.is_empty() {
@@ -117,7 +119,8 @@ impl BagWriter {
             return Ok(Err("ROS 1 has no wstring".to_owned()));
         };
         let record = connection_record(u32::from(number), channel, &of);
-        self.connections.push(Connection { channel: channel.clone(), record, encoder, messages: 0 });
+        self.connections.push(Connection { record, encoder, messages: 0 });
+        self.numbers.insert(channel.clone(), number);
         Ok(Ok(number))
     }
 
