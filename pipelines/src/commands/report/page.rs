@@ -1,5 +1,6 @@
 //! Rendering of the page from templates, a style, a script, and data.
 
+use super::graph::{Drawing, drawing};
 use super::model::Report;
 use anyhow::{Context, Result};
 use minijinja::value::Serde;
@@ -85,12 +86,20 @@ fn render_part(name: &str, report: &Report, summary: Option<&Value>, is_live: bo
         _ => context! {},
     };
     let stages = summary.map(stages).unwrap_or_default();
+    let drawing = pipeline(report).and_then(drawing);
     let page = template.render(context! {
         is_live => is_live,
         report => value(report),
         stages => value(&stages),
         warnings => value(summary.map(warnings).unwrap_or_default()),
-        graph => value(pipeline(report).and_then(super::graph::graph)),
+        graph => value(match &drawing {
+            Some(Drawing::Drawn(graph)) => Some(graph),
+            _ => None,
+        }),
+        stages_not_drawn => value(match drawing {
+            Some(Drawing::TooMany(count)) => Some(count),
+            _ => None,
+        }),
         has_summary => summary.is_some(),
         last => report.times.last().map(|seconds| format!("{seconds:.1}")),
         agreement => value(report.agreement.map(|areas| areas.map(|area| format!("{area:.1}")))),
