@@ -1,5 +1,8 @@
 //! The parser of a `.msg` definition.
 
+/// The maximum number of fields of a type and all types that it uses. Those of ROS have some hundreds.
+pub(super) const MOST_FIELDS: usize = 10_000;
+
 /// The primitive types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Primitive {
@@ -84,10 +87,10 @@ pub(super) struct FieldLine {
     pub(super) count: Count,
 }
 
-/// The fields of a definition; constants and default values are skipped. The error is the invalid line.
+/// The fields of a definition, at most one more than [`MOST_FIELDS`]; constants and default values are skipped. The error is the invalid line.
 pub(super) fn fields(text: &str) -> Result<Vec<FieldLine>, String> {
     let lines = text.lines().map(|line| line.split('#').next().unwrap_or_default().trim());
-    lines.filter(|line| !line.is_empty()).filter_map(|line| field(line).transpose()).collect()
+    lines.filter(|line| !line.is_empty()).filter_map(|line| field(line).transpose()).take(MOST_FIELDS + 1).collect()
 }
 
 /// The field in a line; `None` for a constant.

@@ -1,6 +1,6 @@
 //! The schema of a message type, with the types that it uses.
 
-use super::definition::{Count, FieldLine, Primitive, TypeName, fields};
+use super::definition::{Count, FieldLine, MOST_FIELDS, Primitive, TypeName, fields};
 use crate::schemas::{full_type_name, schema_text};
 use gridweave_runtime::message::Channel;
 use std::collections::{BTreeMap, BTreeSet};
@@ -75,6 +75,9 @@ pub enum SchemaError {
         /// The name.
         field: String,
     },
+    /// A type and those that it uses have too many fields.
+    #[error("the definition of {0} has more than {MOST_FIELDS} fields with those of the types in it")]
+    ManyFields(String),
     /// A type contains itself, or types are nested too deeply.
     #[error("the definition of {0} contains itself, or is nested too deeply")]
     Nested(String),
@@ -101,7 +104,7 @@ impl Schema {
     /// a line `MSG: package/Type`, the definitions of all types that it uses.
     pub fn parse(name: &str, text: &str) -> Result<Self, SchemaError> {
         let sections = sections(name, text);
-        let mut builder = Builder { sections, done: BTreeMap::new(), types: Vec::new() };
+        let mut builder = Builder { sections, done: BTreeMap::new(), types: Vec::new(), field_count: 0 };
         builder.add(&short_name(name), 0)?;
         Ok(Self { types: builder.types })
     }
@@ -164,6 +167,7 @@ struct Builder {
     sections: BTreeMap<String, String>,
     done: BTreeMap<String, usize>,
     types: Vec<MessageType>,
+    field_count: usize,
 }
 
 impl Builder {
@@ -178,6 +182,10 @@ impl Builder {
         let text = self.sections.get(name).map(String::as_str).or_else(|| built_in(name));
         let lines = fields(text.ok_or_else(|| SchemaError::Undefined(name.to_owned()))?)
             .map_err(|line| SchemaError::Line { name: name.to_owned(), line })?;
+        self.field_count += lines.len();
+        if self.field_count > MOST_FIELDS {
+            return Err(SchemaError::ManyFields(name.to_owned()));
+        }
         let mut made = MessageType { name: name.to_owned(), fields: Vec::with_capacity(lines.len()), least_size: 0 };
         let mut names = BTreeSet::new();
         for FieldLine { name: field, of, text_bound, count } in lines {

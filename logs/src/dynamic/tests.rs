@@ -223,6 +223,11 @@ fn a_schema_that_cannot_be_used_gives_a_reason() {
     assert!(of("A[] again").contains("contains itself"), "{}", of("A[] again"));
     let chain: String = (0..1000).map(|n| format!("===\nMSG: a/T{n}\nT{} x\n", n + 1)).collect();
     assert!(of(&format!("T0 x\n{chain}")).contains("nested too deeply"));
+    let many: String = (0..10_001).map(|n| format!("int8 a{n}\n")).collect();
+    assert!(of(&many).contains("more than 10000 fields"), "{}", of(&many));
+    let some: String = many.lines().take(6000).map(|line| format!("{line}\n")).collect();
+    assert!(of(&format!("B b\nC c\n===\nMSG: a/B\n{some}===\nMSG: a/C\n{some}")).contains("more than 10000 fields"));
+    assert!(Schema::parse("a/msg/A", &some).is_ok());
     let channel = Channel { message_encoding: "ros1".into(), ..Default::default() };
     let error = Schema::of_channel(&channel).unwrap_err().to_string();
     assert_eq!(error, "the message is encoded as `ros1`; only `cdr` is supported");

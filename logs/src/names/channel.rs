@@ -6,6 +6,7 @@ use crate::tf::tf_topic;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::stage::frame_of_robot;
 use std::borrow::Cow;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 /// A channel named so that it is unique among the channels of all robots.
@@ -26,7 +27,7 @@ enum Frames {
     /// Put under a robot (unchanged if empty), with stamps shifted `later` by nanoseconds. With `is_map`, an empty
     /// frame name is the map frame. Frames that have the name `logged_as` of the robot in the log get the other
     /// instead.
-    OfRobot { robot: String, logged_as: Option<String>, is_map: bool, later: i64, recoder: Recoder },
+    OfRobot { robot: String, logged_as: Option<String>, is_map: bool, later: i64, recoder: Arc<Recoder> },
     /// Unchanged, because the definition of the messages cannot be used, for this reason.
     Unknown(String),
 }
@@ -42,20 +43,47 @@ pub(crate) enum Renamed {
     Unreadable,
 }
 
+/// The copiers of messages, shared by the channels of one schema; or why there is none.
+#[derive(Debug, Default)]
+pub(super) struct Recoders(HashMap<Channel, Result<Arc<Recoder>, String>>);
+
+impl Recoders {
+    fn of(&mut self, channel: &Channel) -> Result<Arc<Recoder>, String> {
+        // All that a schema depends on.
+        let key = Channel { topic: String::new(), metadata: BTreeMap::new(), ..channel.clone() };
+        let make = || {
+            let schema = Schema::of_channel(channel).map_err(|error| error.to_string())?;
+            Recoder::new(schema).map(Arc::new).ok_or_else(|| "they contain wstring fields".to_owned())
+        };
+        self.0.entry(key).or_insert_with(make).clone()
+    }
+}
+
 impl NamedChannel {
     /// Creates a named channel. Its frames are put under `robot`, or unchanged if that is empty; its stamps are shifted
     /// `later` by nanoseconds.
     pub(crate) fn new(channel: Channel, robot: String, is_map: bool, later: i64, is_wanted: bool) -> Self {
+        Self::sharing(&mut Recoders::default(), channel, robot, is_map, later, is_wanted)
+    }
+
+    /// The same, with a parsed schema that is shared with other channels.
+    pub(super) fn sharing(
+        recoders: &mut Recoders,
+        channel: Channel,
+        robot: String,
+        is_map: bool,
+        later: i64,
+        is_wanted: bool,
+    ) -> Self {
         let frames = match robot.is_empty() && later == 0 {
             true => Frames::AsLogged,
-            false => match Schema::of_channel(&channel) {
-                Err(error) => Frames::Unknown(error.to_string()),
-                Ok(schema) => match Recoder::new(schema) {
-                    None => Frames::Unknown("they contain wstring fields".to_owned()),
-                    Some(recoder) if recoder.names_frames() || later != 0 && recoder.has_stamps() => {
+            false => match recoders.of(&channel) {
+                Err(why) => Frames::Unknown(why),
+                Ok(recoder) => match recoder {
+                    recoder if recoder.names_frames() || later != 0 && recoder.has_stamps() => {
                         Frames::OfRobot { robot, logged_as: None, is_map, later, recoder }
                     }
-                    Some(_) => Frames::AsLogged,
+                    _ => Frames::AsLogged,
                 },
             },
         };
@@ -132,4 +160,26 @@ fn name<'a>(robot: &str, logged_as: Option<&str>, frame: &'a str, unnamed: &'sta
     let frame = if frame.is_empty() { unnamed } else { frame };
     let own = logged_as.and_then(|logged| frame.trim_start_matches('/').strip_prefix(logged)?.strip_prefix(['/', '_']));
     frame_of_robot(robot, own.unwrap_or(frame))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn channels_of_one_schema_share_it() {
+        let channel = |topic: &str, text: &str| Channel {
+            topic: topic.into(),
+            message_encoding: "cdr".into(),
+            schema_name: "a/msg/A".into(),
+            schema_encoding: "ros2msg".into(),
+            schema: text.into(),
+            ..Default::default()
+        };
+        let mut recoders = Recoders::default();
+        let mut of = |topic, text| recoders.of(&channel(topic, text)).unwrap();
+        let one = of("/one", "string frame_id");
+        assert!(Arc::ptr_eq(&one, &of("/two", "string frame_id")));
+        assert!(!Arc::ptr_eq(&one, &of("/two", "string other_frame_id")));
+    }
 }

@@ -1,6 +1,6 @@
 //! Naming of channels, from the content of logs and the rules of the user.
 
-use super::channel::NamedChannel;
+use super::channel::{NamedChannel, Recoders};
 use super::infer_robots::infer_robots;
 use super::logged_name::LoggedName;
 use super::rules::fits;
@@ -83,6 +83,7 @@ pub(super) fn name(
         return Err(NameError::NoSuchTopic { topic: unknown.clone(), renamed, known });
     }
     let mut channels: Vec<BTreeMap<u16, NamedChannel>> = files.iter().map(|_| BTreeMap::new()).collect();
+    let mut recoders = Recoders::default();
     for Draft { file, number, channel, robot, .. } in drafts {
         let classified = roles.classify(&channel);
         let is_map = matches!(classified.role, Role::Map | Role::MapUpdate);
@@ -94,8 +95,8 @@ pub(super) fn name(
         let is_wanted = rules.wants(&channel.topic, robot_of(&known, robots, &channel.topic));
         if let Some(of_file) = channels.get_mut(file) {
             let later = files.get(file).map_or(0, LogFile::later);
-            of_file
-                .insert(number, NamedChannel::new(channel, robot, is_map, later, is_wanted).logged_as(logged_as(file)));
+            let named = NamedChannel::sharing(&mut recoders, channel, robot, is_map, later, is_wanted);
+            of_file.insert(number, named.logged_as(logged_as(file)));
         }
     }
     Ok(Names { channels, robots: robot_of_file, note })
