@@ -222,15 +222,16 @@ impl Drop for OutputFile {
     }
 }
 
-/// Warns that the part of a killed writer is removed, as it may hold a log of which there is nothing else.
+/// Warns that the part of an earlier run is removed, as it may hold a log of which there is nothing else.
 fn warn_of_removal(file: &File, part: &Path) {
     let bytes = file.metadata().map_or(0, |metadata| metadata.len());
     if bytes > 0 {
-        tracing::warn!(
-            "removed {} ({bytes} bytes), which a program that was killed has left; `gridweave recover` can read such a log \
-             before its name is used again",
-            part.display()
-        );
+        let name = part.file_stem().map(Path::new).unwrap_or(part);
+        let is_log =
+            name.extension().is_some_and(|ending| ["mcap", "bag"].iter().any(|log| ending.eq_ignore_ascii_case(log)));
+        let advice =
+            if is_log { "; `gridweave recover` can read such a log before its name is used again" } else { "" };
+        tracing::warn!("removed {} ({bytes} bytes), which an earlier run has left{advice}", part.display());
     }
 }
 
@@ -244,6 +245,10 @@ fn options() -> OpenOptions {
 /// The canonical path of a file, and the path of its part.
 fn places(path: &Path) -> Result<(PathBuf, PathBuf), WriteError> {
     let of_path = |error| WriteError::Io { path: path.to_owned(), error };
+    // Standard output that is a pipe leads to no name.
+    if fs::metadata(path).is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir()) {
+        return Err(WriteError::NotRegular { path: path.to_owned() });
+    }
     let place = resolve(path).map_err(of_path)?;
     match fs::symlink_metadata(&place) {
         Ok(metadata) if metadata.is_dir() => return Err(of_path(ErrorKind::IsADirectory.into())),
@@ -262,9 +267,15 @@ fn places(path: &Path) -> Result<(PathBuf, PathBuf), WriteError> {
         Err(error) if error.kind() != ErrorKind::NotFound => return Err(of_path(error)),
         Err(_) => {}
     }
-    let mut part = place.clone().into_os_string();
+    let part = part_of(&place);
+    Ok((place, part))
+}
+
+/// The file as which `path` is written until it is whole: `NAME.part`.
+pub fn part_of(path: &Path) -> PathBuf {
+    let mut part = path.as_os_str().to_owned();
     part.push(".part");
-    Ok((place, part.into()))
+    part.into()
 }
 
 /// Locks a part.
@@ -375,6 +386,18 @@ mod tests {
         replace(&[(&path, b"whole")]).unwrap();
         assert!(OutputFile::of_killed(&path).unwrap().is_none());
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_pipe_that_is_open_under_another_name_is_no_regular_file_and_a_name_without_room_for_a_part_is_too_long() {
+        let (_reader, writer) = std::io::pipe().unwrap();
+        let open = PathBuf::from(format!("/proc/self/fd/{}", std::os::fd::AsRawFd::as_raw_fd(&writer)));
+        let error = check_writable(&open).unwrap_err();
+        assert!(matches!(error, WriteError::NotRegular { .. }), "{error}");
+        let folder = tempfile::tempdir().unwrap();
+        check_writable(&folder.path().join("a".repeat(250))).unwrap();
+        let error = check_writable(&folder.path().join("a".repeat(251))).unwrap_err().to_string();
+        assert!(error.contains("at most 250 bytes"), "{error}");
     }
 
     #[test]

@@ -11,6 +11,7 @@ pub(crate) fn of_writing(error: &io::Error) -> String {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
             "there is no room left: free some, or choose another folder"
         }
+        ErrorKind::InvalidFilename => "a file is written as NAME.part first, so its name has at most 250 bytes",
         ErrorKind::FileTooLarge => "it is larger than the file system or `ulimit -f` allows",
         _ => return of_reading(error),
     };
@@ -37,6 +38,7 @@ mod tests {
             (Errno::MFILE, "ulimit -n"),
             (Errno::NOSPC, "no room left"),
             (Errno::FBIG, "ulimit -f"),
+            (Errno::NAMETOOLONG, "at most 250 bytes"),
             (Errno::NOENT, "folder exists"),
             (Errno::ROFS, "writable"),
         ] {

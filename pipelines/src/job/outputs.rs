@@ -5,7 +5,7 @@ use super::options::RunOptions;
 use crate::status::BadUse;
 use crate::trace;
 use anyhow::{Result, bail};
-use gridweave_logs::file::{check_writable, is_same_file, is_same_name};
+use gridweave_logs::file::{check_writable, is_same_file, is_same_name, part_of};
 use gridweave_logs::map_file;
 use gridweave_logs::names::Input;
 use gridweave_logs::sink::is_ros1_bag;
@@ -35,6 +35,9 @@ pub(crate) fn check(pipeline: &Pipeline, file: Option<&Path>, options: &RunOptio
             let text = format!("{} would be written twice: choose another name for one of them", output.display());
             return Err(BadUse(text).into());
         }
+        if let Some(other) = outputs.iter().chain(&inputs).find(|other| is_part(other, output)) {
+            return Err(is_the_part(other, output));
+        }
         let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty());
         if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
             bail!("cannot write {}: there is no folder {}; make it first", output.display(), folder.display());
@@ -63,10 +66,25 @@ pub(crate) fn check_is_no_input<'a>(inputs: impl IntoIterator<Item = &'a PathBuf
         // A map that cannot be read is an error of the command.
         map_file::image_of(&path).ok().into_iter().chain([path])
     });
-    match files.into_iter().find(|input| is_or_holds(input, output)) {
-        Some(_) => Err(is_an_input(output)),
-        None => Ok(()),
+    for input in files {
+        if is_or_holds(&input, output) {
+            return Err(is_an_input(output));
+        }
+        if is_part(&input, output) {
+            return Err(is_the_part(&input, output));
+        }
     }
+    Ok(())
+}
+
+/// Whether a file is the one as which an output is written until it is whole, also through links.
+fn is_part(file: &Path, output: &Path) -> bool {
+    resolve(output).is_ok_and(|place| is_same_name(&part_of(&place), file))
+}
+
+fn is_the_part(file: &Path, output: &Path) -> anyhow::Error {
+    let (file, output) = (file.display(), output.display());
+    BadUse(format!("{output} is written as {file} until it is whole: choose another name for one of them")).into()
 }
 
 fn is_an_input(output: &Path) -> anyhow::Error {
@@ -202,6 +220,29 @@ fn is_or_holds(input: &Path, output: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::shipped;
+    use gridweave_runtime::pipeline::Overrides;
+
+    #[test]
+    fn the_part_of_an_output_is_neither_another_output_nor_an_input() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str| folder.path().join(name);
+        let pipeline = shipped::load(Path::new("auto_merge"), &Overrides::default(), &shipped::registry([])).unwrap();
+        let with = |summary: &str| RunOptions {
+            summary: Some(file(summary)),
+            picture: Some(file("a.svg")),
+            ..Default::default()
+        };
+        check(&pipeline, None, &with("s.json")).unwrap();
+        let error = check(&pipeline, None, &with("a.svg.part")).unwrap_err();
+        assert!(crate::is_bad_use(&error), "{error}");
+        let text = format!("{} is written as {}", file("a.svg").display(), file("a.svg.part").display());
+        assert!(error.to_string().contains(&text), "{error}");
+        std::fs::write(file("o.mcap.part"), "").unwrap();
+        let error = check_is_no_input([&file("o.mcap.part")], &file("o.mcap")).unwrap_err();
+        assert!(crate::is_bad_use(&error), "{error}");
+        check_is_no_input([&file("o.mcap.part")], &file("other.mcap")).unwrap();
+    }
 
     #[test]
     fn a_map_and_a_summary_have_the_endings_of_their_formats() {
