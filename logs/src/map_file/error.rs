@@ -7,12 +7,12 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum MapFileError {
     /// A file cannot be read.
-    #[error("cannot read the map file {path}: {source}")]
+    #[error("cannot read the map file {path}: {error}")]
     Read {
         /// The file.
         path: PathBuf,
         /// The error of the operating system.
-        source: std::io::Error,
+        error: std::io::Error,
     },
     /// The YAML file does not describe a map.
     #[error("{path} does not describe a map: {message}")]

@@ -73,7 +73,7 @@ pub fn image_of(yaml: &Path) -> Result<PathBuf, MapFileError> {
 /// The content of the YAML file, with the image's path relative to the working directory; and the path in the file if
 /// that image is missing and another one is used.
 fn describe(yaml: &Path) -> Result<(Description, Option<PathBuf>), MapFileError> {
-    let text = input_file::read_text(yaml).map_err(|source| MapFileError::Read { path: yaml.to_owned(), source })?;
+    let text = input_file::read_text(yaml).map_err(|error| MapFileError::Read { path: yaml.to_owned(), error })?;
     let description = Description::parse(&text, yaml)?;
     let named = yaml.parent().unwrap_or(Path::new("")).join(&description.image);
     let (image, missing) = match image_beside_yaml(&named, yaml) {

@@ -11,7 +11,7 @@ use std::fs;
 #[serde(rename_all = "snake_case")]
 pub enum LinkError {
     /// An operation of iceoryx2 failed.
-    #[error("cannot {doing}: iceoryx2 says {cause}; {}", HELP)]
+    #[error("cannot {doing}: iceoryx2 says {cause}; {}", help(getrlimit(Resource::Fsize).current))]
     Shared {
         /// What was being done.
         doing: String,
@@ -101,8 +101,16 @@ fn are_files_used_up() -> bool {
     }
 }
 
-/// What fixes most errors of shared memory.
-const HELP: &str = "check that /dev/shm has free space and is writable";
+/// What fixes most errors of shared memory, where files have at most so many bytes.
+fn help(longest_file: Option<u64>) -> String {
+    let help = "check that /dev/shm has free space and is writable";
+    match longest_file {
+        None => help.to_owned(),
+        Some(bytes) => format!(
+            "{help}; or raise the limit of the size of files, {bytes} bytes (`ulimit -f`), which shared memory has as well"
+        ),
+    }
+}
 
 impl From<LinkError> for crate::stage::StageError {
     fn from(error: LinkError) -> Self {
@@ -124,5 +132,16 @@ impl LinkError {
                 None => Self::Shared { doing, cause },
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::help;
+
+    #[test]
+    fn a_limit_of_the_size_of_files_is_named_beside_the_shared_memory() {
+        assert_eq!(help(None), "check that /dev/shm has free space and is writable");
+        assert!(help(Some(51_200)).contains("/dev/shm") && help(Some(51_200)).contains("51200 bytes (`ulimit -f`)"));
     }
 }

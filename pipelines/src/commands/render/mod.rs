@@ -81,7 +81,7 @@ pub(crate) fn render(args: &RenderArgs) -> Result<Status> {
     let state = read(args)?;
     check_robots(&args.robot, &state)?;
     let placing = Placing::of(&state, &args.robot.iter().map(String::as_str).collect(), args.apart);
-    let picture = draw(args, &state, &placing).map_err(|error| explain(error, &state))?;
+    let picture = draw(args, &state, &placing).map_err(|error| explain(error, args.merged, &state))?;
     picture.save(&args.output)?;
     print_line(format_args!("wrote {}: {}", args.output.display(), contents(&placing, args.merged)))?;
     Ok(Status::Done)
@@ -136,12 +136,21 @@ fn layer<'a>(name: &'a str, colour: [u8; 3], map: &'a GridMap) -> MapLayer<'a> {
 }
 
 /// Explains what is missing where nothing can be drawn.
-fn explain(error: PictureError, state: &MergeState) -> anyhow::Error {
+fn explain(error: PictureError, is_merged_map: bool, state: &MergeState) -> anyhow::Error {
     match error {
         PictureError::Empty if state.robots_with_maps().next().is_none() && state.merged().is_none() => {
             anyhow::anyhow!(
                 "there is no map to draw: a nav_msgs/msg/OccupancyGrid is needed on /map or on /ROBOT/map; `gridweave info LOG` \
              lists the topics, and --rename renames one"
+            )
+        }
+        PictureError::Empty if !is_merged_map => {
+            let sizes =
+                state.robots_with_maps().map(|(robot, map)| format!("{} m in that of {robot}", map.info.resolution));
+            anyhow::anyhow!(
+                "nothing of the maps can be drawn: all cells are unknown, or are too large to be those of a building ({}); check \
+                 the `resolution` of each",
+                sizes.collect::<Vec<_>>().join(", ")
             )
         }
         PictureError::Empty if state.merged().is_none() => {
