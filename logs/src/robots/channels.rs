@@ -231,3 +231,50 @@ fn role_by_type<'a>(patterns: &ChannelPatterns, channel: &'a Channel) -> Option<
     let localizer = patterns.localizer(channel).map(|robot| (Role::Pose(PoseSource::PoseWithCovariance), robot));
     localizer.or_else(|| Some((Role::Odometry, patterns.odometry(channel)?)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gridweave_runtime::ros::{
+        LaserScan, OccupancyGrid, Odometry, PoseStamped, PoseWithCovarianceStamped, RosMessage, TFMessage,
+    };
+
+    #[test]
+    fn roles_do_not_depend_on_the_order_of_the_channels() {
+        const LOCALIZED: &str = PoseWithCovarianceStamped::NAME;
+        let expected = [
+            ("/mapped/map", OccupancyGrid::NAME, Role::Map),
+            ("/mapped/scan", LaserScan::NAME, Role::Other),
+            ("/mapped/amcl_pose", LOCALIZED, Role::Pose(PoseSource::PoseWithCovariance)),
+            ("/mapped/odom", Odometry::NAME, Role::Other),
+            ("/posed/map", OccupancyGrid::NAME, Role::Map),
+            ("/posed/amcl_pose", LOCALIZED, Role::Other),
+            ("/posed/pose", PoseStamped::NAME, Role::Pose(PoseSource::Pose)),
+            ("/scanned/scan", LaserScan::NAME, Role::Scan),
+            ("/scanned/odom", Odometry::NAME, Role::Odometry),
+            ("/tf", TFMessage::NAME, Role::Tf),
+        ];
+        let channel = |(topic, type_name, _): &(&str, &str, Role)| Channel {
+            topic: (*topic).to_owned(),
+            schema_name: (*type_name).to_owned(),
+            message_encoding: "cdr".to_owned(),
+            ..Default::default()
+        };
+        let mut channels: Vec<Channel> = expected.iter().map(channel).collect();
+        for _ in 0..channels.len() {
+            channels.rotate_left(1);
+            for order in [channels.clone(), channels.iter().rev().cloned().collect()] {
+                let roles = RobotChannels::new(RobotTopics::default(), order.iter());
+                for (topic, _, role) in &expected {
+                    let channel = channels.iter().find(|channel| channel.topic == *topic).unwrap();
+                    assert_eq!(roles.classify(channel).role, *role, "{topic}");
+                }
+                assert_eq!(roles.mapped().collect::<Vec<_>>(), ["mapped", "posed"]);
+                assert_eq!(roles.mapped_and_posed().collect::<Vec<_>>(), ["mapped", "posed"]);
+                assert_eq!(roles.scanned().collect::<Vec<_>>(), ["scanned"]);
+                assert_eq!(roles.unposed().collect::<Vec<_>>(), ["scanned"]);
+                assert!(roles.has_odometry("scanned") && !roles.has_odometry("mapped"));
+            }
+        }
+    }
+}
