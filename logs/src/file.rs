@@ -6,6 +6,7 @@
 
 mod left;
 
+use left::warn_of_removal;
 pub use left::{leave, place, remove_left};
 pub(crate) use left::{replace_or_leave, unlock_left};
 
@@ -219,19 +220,6 @@ impl Drop for OutputFile {
         if !self.is_kept {
             let _ = fs::remove_file(&self.part);
         }
-    }
-}
-
-/// Warns that the part of an earlier run is removed, as it may hold a log of which there is nothing else.
-fn warn_of_removal(file: &File, part: &Path) {
-    let bytes = file.metadata().map_or(0, |metadata| metadata.len());
-    if bytes > 0 {
-        let name = part.file_stem().map(Path::new).unwrap_or(part);
-        let is_log =
-            name.extension().is_some_and(|ending| ["mcap", "bag"].iter().any(|log| ending.eq_ignore_ascii_case(log)));
-        let advice =
-            if is_log { "; `gridweave recover` can read such a log before its name is used again" } else { "" };
-        tracing::warn!("removed {} ({bytes} bytes), which an earlier run has left{advice}", part.display());
     }
 }
 

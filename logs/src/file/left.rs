@@ -4,6 +4,7 @@
 //! the end of its process to the end of the run.
 
 use super::{OutputFile, WriteError};
+use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
@@ -85,6 +86,19 @@ pub fn place(needed: &[&Path], optional: &[&Path]) -> Result<(), WriteError> {
 pub fn remove_left(files: &[&Path]) {
     for mut output in files.iter().filter_map(|path| OutputFile::of_left(path).ok().flatten()) {
         output.keep(false);
+    }
+}
+
+/// Warns that the part of an earlier run is removed, as it may hold a log of which there is nothing else.
+pub(super) fn warn_of_removal(file: &File, part: &Path) {
+    let bytes = file.metadata().map_or(0, |metadata| metadata.len());
+    if bytes > 0 {
+        let name = part.file_stem().map(Path::new).unwrap_or(part);
+        let is_log =
+            name.extension().is_some_and(|ending| ["mcap", "bag"].iter().any(|log| ending.eq_ignore_ascii_case(log)));
+        let advice =
+            if is_log { "; `gridweave recover` can read such a log before its name is used again" } else { "" };
+        tracing::warn!("removed {} ({bytes} bytes), which an earlier run has left{advice}", part.display());
     }
 }
 

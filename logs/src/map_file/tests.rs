@@ -214,9 +214,10 @@ fn invalid_values_are_reported_with_valid_ones() {
 #[test]
 fn missing_and_broken_files_are_reported() {
     let (folder, path) = folder(&yaml(""));
-    let text = load(&folder.path().join("other.yaml")).unwrap_err().to_string();
+    let unreadable = load(&folder.path().join("other.yaml")).unwrap_err();
+    let text = unreadable.to_string();
     assert!(text.starts_with("cannot read the map file") && text.contains("other.yaml: No such file"), "{text}");
-    assert!(std::error::Error::source(&error).is_none(), "its text says all");
+    assert!(std::error::Error::source(&unreadable).is_none(), "its text says all");
     for bytes in [b"P5\n3 2\n255\n\x00".as_slice(), b"no image", b""] {
         fs::write(folder.path().join("map.pgm"), bytes).unwrap();
         let text = load(&path).unwrap_err().to_string();

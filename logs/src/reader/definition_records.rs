@@ -81,7 +81,8 @@ impl<'a> ChannelFields<'a> {
         let pairs = fields.block()?.0;
         let (mut rest, mut count) = (Fields(pairs), 0);
         while !rest.0.is_empty() {
-            (rest.block()?, rest.block()?);
+            rest.block()?;
+            rest.block()?;
             count += 1;
         }
         Some(Self { schema, topic, message_encoding, pairs, count })
