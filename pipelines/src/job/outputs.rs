@@ -5,7 +5,7 @@ use super::options::RunOptions;
 use crate::status::BadUse;
 use crate::trace;
 use anyhow::{Result, bail};
-use gridweave_logs::file::{check_writable, is_same_file, is_same_name, part_of};
+use gridweave_logs::file::{check_writable, is_same_file, is_same_name, part_of, resolve};
 use gridweave_logs::map_file;
 use gridweave_logs::names::Input;
 use gridweave_logs::sink::is_ros1_bag;
