@@ -158,7 +158,8 @@ mod tests {
             noise.learn(&noise.corrected(&moved), &Pose2::identity(), &Matrix3::zeros(), &(1e6 * equal));
             assert!(step > 0 || noise.scale() > 0.98, "one step says little");
         }
-        assert!((noise.scale() - 0.9).abs() < 0.01, "{}", noise.scale());
+        // What was assumed before the first step still counts a tenth.
+        assert!((noise.scale() - 0.91).abs() < 0.002, "{}", noise.scale());
         assert_eq!(blind.scale(), 1.0);
     }
 
