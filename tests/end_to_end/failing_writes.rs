@@ -68,7 +68,7 @@ fn a_picture_and_a_report_that_are_too_large_leave_the_earlier_ones() {
     let TestMap { info, mut cells } = TestMap::filled(60, 50, 0.05, 0);
     cells[..3 * 60].fill(100);
     map_file::save(&folder.path().join("a.yaml"), &GridMap { info, cells }).unwrap();
-    gridweave(folder.path(), &["merge", "a.yaml", "a.yaml", "-o", "a.mcap"]);
+    gridweave(folder.path(), &["convert", "robot1=a.yaml", "-o", "a.mcap"]).assert(0, &[]);
     for (args, output) in
         [(["render", "a.yaml", "-o", "a.svg"], "a.svg"), (["report", "a.mcap", "-o", "a.html"], "a.html")]
     {

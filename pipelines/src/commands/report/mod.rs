@@ -54,8 +54,8 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Status> {
                     `gridweave render`";
         return Err(BadUse(text.to_owned()).into());
     }
-    check_ending(&args.output, "a page", &["html", "htm"])?;
     check_is_no_input(args.inputs.iter().chain(&args.summary), &args.output)?;
+    check_ending(&args.output, "a page", &["html", "htm"])?;
     let summary = args.summary.as_deref().map(read_summary).transpose()?;
     let times = collect::moments(&args.inputs, &args.names)?;
     if times.is_empty() {
