@@ -1,7 +1,7 @@
 //! One robot with its scans and poses.
 
 use super::continuous_odometry::ContinuousOdometry;
-use super::scan_odometry::{BlindDrive, ScanOdometry};
+use super::scan_odometry::ScanOdometry;
 use super::slam_map::{LostScans, LostWay, SlamMap};
 use super::{ScanBeams, ScanMap, ScanMapperParameters, TooLarge};
 use crate::shared::geometry::{Point2, Pose2, pose};
@@ -61,6 +61,8 @@ pub(super) struct Robot {
     pub(super) drawn: Option<[LogTime; 2]>,
     /// Time of the last scan in the map that was sent.
     pub(super) sent_until: Option<LogTime>,
+    /// Whether it was reported that it has lost its way.
+    is_loss_reported: bool,
 }
 
 impl Robot {
@@ -78,6 +80,7 @@ impl Robot {
             scans: 0,
             drawn: None,
             sent_until: None,
+            is_loss_reported: false,
         }
     }
 
@@ -164,17 +167,11 @@ impl Robot {
         }
     }
 
-    /// Seconds from the first scan to where it has lost its way, and the length of the pause before it.
-    pub(super) fn lost_way(&self) -> Option<(f64, f64)> {
+    /// Seconds from the first scan to where it has lost its way, and the length of the pause before it; given once.
+    pub(super) fn take_lost_way(&mut self) -> Option<(f64, f64)> {
         let LostWay { time, pause } = self.slam_map()?.lost_way()?;
-        Some((time.seconds_since(self.first_scan?), pause))
-    }
-
-    /// Seconds from the first scan to the longest drive whose scans do not show how far it went, and its seconds.
-    pub(super) fn longest_blind(&self) -> Option<(f64, f64)> {
-        let Localization::ByScans(_, odometry) = &self.localization else { return None };
-        let BlindDrive { since, seconds } = odometry.longest_blind()?;
-        Some((since.seconds_since(self.first_scan?), seconds))
+        let is_reported = std::mem::replace(&mut self.is_loss_reported, true);
+        Some((time.seconds_since(self.first_scan?), pause)).filter(|_| !is_reported)
     }
 
     /// Starts to register scans, along odometry if there is any, once no poses came for long enough or none will come.

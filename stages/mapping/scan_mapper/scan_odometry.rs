@@ -20,26 +20,9 @@ pub(super) struct ScanOdometry {
     last: Option<(LogTime, Pose2)>,
     /// Metres and radians per second, in the frame of the base.
     velocity: [f64; 3],
-    /// Start of the scans up to the last one that do not show the way along a corridor.
-    blind_since: Option<LogTime>,
-    longest_blind: Option<BlindDrive>,
-}
-
-/// Scans that do not show how far the robot goes along a corridor.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct BlindDrive {
-    /// Time of the first of them.
-    pub(super) since: LogTime,
-    /// Time from it to the last, seconds.
-    pub(super) seconds: f64,
 }
 
 impl ScanOdometry {
-    /// The longest drive along a corridor whose walls do not show how far the robot goes.
-    pub(super) fn longest_blind(&self) -> Option<BlindDrive> {
-        self.longest_blind
-    }
-
     /// The motion of the base in the seconds after a scan, at the velocity between the last two.
     pub(super) fn motion(&self, seconds: f64) -> Pose2 {
         let [x, y, turn] = self.velocity.map(|velocity| velocity * seconds.min(LONGEST_GAP));
@@ -61,7 +44,6 @@ impl ScanOdometry {
         if gap > LONGEST_GAP && !located.is_some_and(|located| located.is_sure) {
             slam.lose_way(time, gap);
         }
-        self.note_blindness(before, time, located.is_some_and(|located| !located.shows_way));
         // Where the scan lies on no other one, the robot is taken to go on as it did.
         let found = located.map_or(guess, |located| located.pose);
         if gap > 0.0 {
@@ -70,17 +52,5 @@ impl ScanOdometry {
         }
         self.last = Some((time, found));
         found
-    }
-
-    fn note_blindness(&mut self, before: LogTime, time: LogTime, is_blind: bool) {
-        if !is_blind {
-            self.blind_since = None;
-            return;
-        }
-        let since = *self.blind_since.get_or_insert(before);
-        let blind = BlindDrive { since, seconds: time.seconds_since(since) };
-        if self.longest_blind.is_none_or(|longest| blind.seconds > longest.seconds) {
-            self.longest_blind = Some(blind);
-        }
     }
 }

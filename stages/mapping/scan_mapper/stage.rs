@@ -35,8 +35,6 @@ pub fn kind() -> StageKind {
 const SCANS_OF_A_DRIVE: usize = 50;
 /// Error of the ways of odometry that is worth a warning, as a share.
 const ODOMETRY_ERROR: f64 = 0.05;
-/// Seconds along a corridor whose walls show no way that are worth a warning.
-const BLIND_SECONDS: f64 = 3.0;
 
 struct ScanMapper {
     parameters: ScanMapperParameters,
@@ -181,6 +179,13 @@ impl ScanMapper {
             }
             ScanOutcome::TooLarge => output.warn(too_large(name)),
         });
+        if let Some((seconds, pause)) = robot.take_lost_way() {
+            output.warn(format!(
+                "{name} has lost its way {seconds:.1} s after its first scan: nothing shows how it moved in the {pause:.1} s before, and \
+                 its scans lie on no earlier ones. What it saw from there on is left out of its map. To use it, cut the log there \
+                 (`gridweave filter` with --end and with --start), and merge both parts as two robots"
+            ));
+        }
         let Some([first, last]) = robot.drawn else { return Ok(()) };
         let is_offline = self.parameters.mode == MappingMode::Offline && robot.is_by_slam();
         if !is_offline {
@@ -239,19 +244,6 @@ fn explain(
         output.warn(format!(
             "the odometry of {name} leaps, for the first time {seconds:.1} s after its first scan, as where its driver starts \
              again: the robot is taken to be where it was"
-        ));
-    }
-    if let Some((seconds, pause)) = robot.lost_way() {
-        output.warn(format!(
-            "{name} has lost its way {seconds:.1} s after its first scan: nothing shows how it moved in the {pause:.1} s before, and \
-             its scans lie on no earlier ones. What it saw from there on is left out of its map. To use it, cut the log there \
-             (`gridweave filter` with --end and with --start), and merge both parts as two robots"
-        ));
-    }
-    if let Some((seconds, blind)) = robot.longest_blind().filter(|(_, blind)| *blind >= BLIND_SECONDS) {
-        output.warn(format!(
-            "for {blind:.0} s, from {seconds:.1} s after its first scan on, the scans of {name} do not show how far it went along a \
-             corridor: its map may be too short or too long there. Its odometry would show it"
         ));
     }
     if let Some(scale) = robot.odometry_scale().filter(|scale| (scale - 1.0).abs() > ODOMETRY_ERROR) {

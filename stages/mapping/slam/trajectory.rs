@@ -30,10 +30,6 @@ const REVISITED_DISTANCE: f64 = 10.0;
 const REVISITED_SUBMAPS: usize = 6;
 const REVISITED_DEVIATIONS: [f64; 2] = [0.15, 0.05];
 
-/// Information about the position along a corridor, as a share of that across it, up to which its walls do not show
-/// where the robot is: normals that are off by a seventh of a radian feign as much.
-const BLIND_SHARE: f64 = 0.02;
-
 /// A scan that was registered without being added.
 #[derive(Clone, Copy, Debug)]
 pub struct LocatedScan {
@@ -41,8 +37,6 @@ pub struct LocatedScan {
     pub pose: Pose2,
     /// Whether most of its points lie on the map.
     pub is_sure: bool,
-    /// Whether its walls show the position in all directions, which those of a bare corridor do not.
-    pub shows_way: bool,
 }
 
 /// The scans of a robot with their poses, in the frame of the first.
@@ -142,14 +136,8 @@ impl Trajectory {
         let information = Matrix3::from_diagonal(&Vector3::new(place, place, yaw));
         let information = turned_information(&information, &last.rotation);
         let found = register(&self.local_map(), points, &(last * guess), &information, deviations);
-        let place = found.information.fixed_view::<2, 2>(0, 0).into_owned();
-        let by_direction = place.symmetric_eigenvalues();
-        (found.matched >= LEAST_MATCHED).then(|| LocatedScan {
-            pose: last.inv_mul(&found.pose),
-            is_sure: found.matched >= WELL_MATCHED,
-            // Written so that a value that is not a number fails it.
-            shows_way: by_direction.min() > BLIND_SHARE * by_direction.max(),
-        })
+        (found.matched >= LEAST_MATCHED)
+            .then(|| LocatedScan { pose: last.inv_mul(&found.pose), is_sure: found.matched >= WELL_MATCHED })
     }
 
     fn push(&mut self, pose: Pose2, way: f64, points: Vec<ScanPoint>) {
