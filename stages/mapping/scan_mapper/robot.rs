@@ -2,7 +2,7 @@
 
 use super::continuous_odometry::ContinuousOdometry;
 use super::scan_odometry::ScanOdometry;
-use super::slam_map::{LostScans, LostWay, SlamMap};
+use super::slam_map::{LossCause, LostScans, LostWay, SlamMap};
 use super::{ScanBeams, ScanMap, ScanMapperParameters, TooLarge};
 use crate::shared::geometry::{Point2, Pose2, pose};
 use crate::shared::robot_clock::RobotClock;
@@ -167,11 +167,11 @@ impl Robot {
         }
     }
 
-    /// Seconds from the first scan to where it has lost its way, and the length of the pause before it; given once.
-    pub(super) fn take_lost_way(&mut self) -> Option<(f64, f64)> {
-        let LostWay { time, pause } = self.slam_map()?.lost_way()?;
+    /// Seconds from the first scan to where it has lost its way, and why; given once.
+    pub(super) fn take_lost_way(&mut self) -> Option<(f64, LossCause)> {
+        let LostWay { time, cause } = self.slam_map()?.lost_way()?;
         let is_reported = std::mem::replace(&mut self.is_loss_reported, true);
-        Some((time.seconds_since(self.first_scan?), pause)).filter(|_| !is_reported)
+        Some((time.seconds_since(self.first_scan?), cause)).filter(|_| !is_reported)
     }
 
     /// Starts to register scans, along odometry if there is any, once no poses came for long enough or none will come.
@@ -203,7 +203,7 @@ impl Robot {
                     continue;
                 }
                 let scan = without_motion(&scan, |delay| Some(odometry.motion(delay)));
-                let at = odometry.pose(time, &scan, slam);
+                let at = odometry.pose(time, &scan, slam, parameters);
                 self.kept_odometry.push((time, at));
                 let is_due = slam.is_due(time, &at, parameters);
                 let is_matched = !is_due || slam.add(time, &at, &scan);
@@ -315,9 +315,11 @@ fn add_to_slam(
         || without_motion(scan, |delay| Some(start.inv_mul(&pose_at(odometry, time.plus_seconds(delay), parameters)?)));
     let pause = blind.filter(|(end, _)| *end <= time && slam.last_time().is_some_and(|last| last < *end));
     if let Some((end, pause)) = pause
-        && !slam.locate(&start, UNSEEN_MOTION, &still()).is_some_and(|located| located.is_sure)
+        && !slam
+            .locate(&start, UNSEEN_MOTION, &still())
+            .is_some_and(|located| located.is_sure && located.deviation <= parameters.step)
     {
-        slam.lose_way(end, pause);
+        slam.lose_way(end, LossCause::Pause(pause));
     }
     if !slam.is_due(time, &start, parameters) {
         return ScanOutcome::Used;

@@ -1,7 +1,7 @@
 //! Odometry from the scans alone, for robots that have no other.
 
-use super::ScanBeams;
-use super::slam_map::SlamMap;
+use super::slam_map::{LossCause, SlamMap};
+use super::{ScanBeams, ScanMapperParameters};
 use crate::shared::geometry::{Pose2, pose};
 use gridweave_runtime::message::LogTime;
 
@@ -18,6 +18,8 @@ const LONGEST_GAP: f64 = 1.0;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ScanOdometry {
     last: Option<(LogTime, Pose2)>,
+    /// Time of the last scan whose walls showed where it was made.
+    seen: Option<LogTime>,
     /// Metres and radians per second, in the frame of the base.
     velocity: [f64; 3],
 }
@@ -29,11 +31,17 @@ impl ScanOdometry {
         pose(x, y, turn)
     }
 
-    /// The pose at a scan, in the frame of the first one. After a pause the scan must lie on earlier ones, or the robot
-    /// has lost its way.
-    pub(super) fn pose(&mut self, time: LogTime, scan: &ScanBeams, slam: &mut SlamMap) -> Pose2 {
-        let Some((before, last)) = self.last else {
-            self.last = Some((time, Pose2::identity()));
+    /// The pose at a scan, in the frame of the first one. The robot has lost its way if the scan lies on no earlier ones
+    /// after a pause, or if for as long its walls do not show whether the robot has moved by a step.
+    pub(super) fn pose(
+        &mut self,
+        time: LogTime,
+        scan: &ScanBeams,
+        slam: &mut SlamMap,
+        parameters: &ScanMapperParameters,
+    ) -> Pose2 {
+        let (Some((before, last)), Some(seen)) = (self.last, self.seen) else {
+            (self.last, self.seen) = (Some((time, Pose2::identity())), Some(time));
             return Pose2::identity();
         };
         let gap = time.seconds_since(before).max(0.0);
@@ -42,7 +50,12 @@ impl ScanOdometry {
             [0, 1].map(|axis| LEAST_DEVIATIONS[axis] + 0.5 * ACCELERATION[axis] * gap.min(LONGEST_GAP).powi(2));
         let located = slam.locate(&guess, deviations, scan);
         if gap > LONGEST_GAP && !located.is_some_and(|located| located.is_sure) {
-            slam.lose_way(time, gap);
+            slam.lose_way(time, LossCause::Pause(gap));
+        }
+        match located {
+            Some(located) if located.deviation <= parameters.step => self.seen = Some(time),
+            Some(_) if time.seconds_since(seen) > LONGEST_GAP => slam.lose_way(seen, LossCause::ParallelWalls),
+            _ => {}
         }
         // Where the scan lies on no other one, the robot is taken to go on as it did.
         let found = located.map_or(guess, |located| located.pose);

@@ -38,13 +38,20 @@ pub(super) struct SlamMap {
     lost_way: Option<LostWay>,
 }
 
-/// A pause in which nothing shows how the robot moved, and after which its scans lie on no earlier ones.
+/// Where a robot has lost its way: how it moved from there on is not known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LostWay {
-    /// End of the pause.
     pub(super) time: LogTime,
-    /// Its length, seconds.
-    pub(super) pause: f64,
+    pub(super) cause: LossCause,
+}
+
+/// Why a robot has lost its way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum LossCause {
+    /// Nothing shows how it moved in a pause of so many seconds before, and its scans lie on no earlier ones.
+    Pause(f64),
+    /// It has no odometry, and its scans show walls of one direction only, as in a bare corridor.
+    ParallelWalls,
 }
 
 /// Scans that lie on no others.
@@ -71,8 +78,8 @@ impl SlamMap {
     }
 
     /// Leaves out all later scans: where they were made is not known.
-    pub(super) fn lose_way(&mut self, time: LogTime, pause: f64) {
-        self.lost_way.get_or_insert(LostWay { time, pause });
+    pub(super) fn lose_way(&mut self, time: LogTime, cause: LossCause) {
+        self.lost_way.get_or_insert(LostWay { time, cause });
     }
 
     /// Where the robot has lost its way.

@@ -1,6 +1,7 @@
 //! The stage `scan_mapper`.
 
 use super::robot::{Robot, ScanOutcome};
+use super::slam_map::LossCause;
 use super::{MappingMode, ScanBeams, ScanMapperParameters};
 use crate::shared::geometry::Pose2;
 use crate::shared::robot_clock::Leap;
@@ -179,12 +180,8 @@ impl ScanMapper {
             }
             ScanOutcome::TooLarge => output.warn(too_large(name)),
         });
-        if let Some((seconds, pause)) = robot.take_lost_way() {
-            output.warn(format!(
-                "{name} has lost its way {seconds:.1} s after its first scan: nothing shows how it moved in the {pause:.1} s before, and \
-                 its scans lie on no earlier ones. What it saw from there on is left out of its map. To use it, cut the log there \
-                 (`gridweave filter` with --end and with --start), and merge both parts as two robots"
-            ));
+        if let Some((seconds, cause)) = robot.take_lost_way() {
+            output.warn(lost_way(name, seconds, cause));
         }
         let Some([first, last]) = robot.drawn else { return Ok(()) };
         let is_offline = self.parameters.mode == MappingMode::Offline && robot.is_by_slam();
@@ -312,6 +309,21 @@ fn send_pose(
     let Some(pose) = robot.in_map(time, odometry) else { return Ok(()) };
     let header = Header::new(time, map_frame(name, robot));
     output.pose.send(name, &PoseStamped { header, pose: pose.into() }.into())
+}
+
+fn lost_way(name: &str, seconds: f64, cause: LossCause) -> String {
+    let why = match cause {
+        LossCause::Pause(pause) => {
+            format!("nothing shows how it moved in the {pause:.1} s before, and its scans lie on no earlier ones")
+        }
+        LossCause::ParallelWalls => {
+            "it has no odometry, and its scans do not show how it moved along walls that are bare and parallel".to_owned()
+        }
+    };
+    format!(
+        "{name} has lost its way {seconds:.1} s after its first scan: {why}. What it saw from there on is left out of its map. To use \
+         it, cut the log there (`gridweave filter` with --end and with --start), and merge both parts as two robots"
+    )
 }
 
 fn too_large(name: &str) -> String {

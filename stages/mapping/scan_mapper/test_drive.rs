@@ -6,7 +6,7 @@ use gridweave_runtime::ros::{Header, RangeScan};
 use std::f64::consts::TAU;
 
 /// Outer walls, and a box in the room: left, low, right, high, metres.
-pub(super) const WALLS: [[f64; 4]; 2] = [[-4.0, -3.0, 5.0, 3.0], [1.5, -1.0, 2.5, 0.2]];
+pub(super) const WALLS: [[f64; 4]; 2] = [[-4.0, -3.0, 6.0, 3.0], [1.5, -1.0, 2.5, 0.2]];
 pub(super) const BEAMS: usize = 360;
 /// Seconds of a turn of the lidar.
 pub(super) const TURN: f64 = 0.1;
@@ -14,12 +14,12 @@ pub(super) const CELL: f64 = 0.05;
 /// Where the lidar is mounted.
 pub(super) const LIDAR: [f64; 3] = [0.15, -0.05, 0.4];
 
-/// The nearest wall on a beam.
-pub(super) fn cast(from: &Pose2, angle: f64) -> f64 {
+/// The nearest of the walls on a beam.
+pub(super) fn cast(walls: &[[f64; 4]], from: &Pose2, angle: f64) -> f64 {
     let (sine, cosine) = (from.rotation.angle() + angle).sin_cos();
     let start = from.translation.vector;
     let mut nearest = f64::INFINITY;
-    for [left, low, right, high] in WALLS {
+    for &[left, low, right, high] in walls {
         for x in [left, right] {
             let (range, y) = ((x - start.x) / cosine, start.y + (x - start.x) / cosine * sine);
             if range > 0.0 && (low..=high).contains(&y) {
@@ -66,7 +66,7 @@ pub(super) fn scan(seconds: f64) -> RangeScan {
     let apart = TAU / BEAMS as f64;
     let range = |beam: usize| {
         let lidar = truth(seconds + TURN * beam as f64 / BEAMS as f64) * pose(x, y, yaw);
-        cast(&lidar, -3.0 + apart * beam as f64) as f32
+        cast(&WALLS, &lidar, -3.0 + apart * beam as f64) as f32
     };
     RangeScan {
         header: Header::new(at(seconds), "robot1/base_link"),
@@ -86,5 +86,5 @@ pub(super) fn scan(seconds: f64) -> RangeScan {
 pub(super) fn still_ranges(seconds: f64) -> Vec<f32> {
     let [x, y, yaw] = LIDAR;
     let lidar = truth(seconds) * pose(x, y, yaw);
-    (0..BEAMS).map(|beam| cast(&lidar, -3.0 + TAU / BEAMS as f64 * beam as f64) as f32).collect()
+    (0..BEAMS).map(|beam| cast(&WALLS, &lidar, -3.0 + TAU / BEAMS as f64 * beam as f64) as f32).collect()
 }

@@ -1,10 +1,11 @@
 //! Robots whose odometry, clock or lidar is not as it should be.
 
-use super::test_drive::{CELL, at, scan, still_ranges, truth};
+use super::test_drive::{BEAMS, CELL, at, cast, scan, still_ranges, truth};
 use super::tests::{Bench, measure};
-use crate::shared::geometry::Pose2;
+use crate::shared::geometry::{Pose2, pose};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, PoseStamped, PoseWithCovarianceStamped, RangeScan, UnmergedRobot};
+use std::f64::consts::TAU;
 
 /// A scan of one moment.
 fn still(seconds: f64) -> RangeScan {
@@ -133,4 +134,27 @@ fn a_robot_that_is_elsewhere_after_a_pause_has_lost_its_way() {
     assert!(!poses.is_empty() && poses.iter().all(|pose| LogTime::from(pose.header.stamp) < at(10.0)));
     let lost = "robot1 has lost its way 15.0 s after its first scan: nothing shows how it moved in the 5.1 s before";
     assert!(warns(&mut bench, lost), "{:?}", bench.0.warnings());
+}
+
+#[test]
+fn a_robot_without_odometry_loses_its_way_where_walls_do_not_show_how_it_moves() {
+    // The end of the corridor is out of reach after 10 s.
+    let corridor = [[-3.0, -1.0, 60.0, 1.0]];
+    let mut bench = Bench::new("mode = 'offline'");
+    for tick in 0..300 {
+        let seconds = 0.1 * f64::from(tick);
+        let (x, sway) = (0.5 * seconds, 0.05 * (0.5 * seconds).sin());
+        let lidar = pose(x, sway, sway);
+        let angle = |beam: usize| -3.0 + TAU / BEAMS as f64 * beam as f64;
+        let ranges = (0..BEAMS).map(|beam| cast(&corridor, &lidar, angle(beam)) as f32).collect();
+        let still = RangeScan { x: 0.0, y: 0.0, yaw: 0.0, range_max: 8.0, ranges, ..still(seconds) };
+        bench.scan(seconds, &still);
+    }
+    assert!(bench.map(30.0).0.is_some(), "what was before stays");
+    let poses: Vec<PoseWithCovarianceStamped> = bench.0.take("pose").unwrap();
+    let last = poses.last().unwrap();
+    let lost = LogTime::from(last.header.stamp).seconds_since(at(0.0));
+    assert!((9.0..12.0).contains(&lost), "{lost}");
+    assert!((last.pose.pose.position.x - 0.5 * lost).abs() < 0.1, "{lost} {:?}", last.pose.pose);
+    assert!(warns(&mut bench, "along walls that are bare and parallel"), "{:?}", bench.0.warnings());
 }

@@ -21,6 +21,9 @@ const NORMAL_BEAMS: f64 = 2.5;
 const MAX_NORMAL_RADIUS: f64 = 0.6;
 /// Largest standard deviation of points across a wall, as a share of that along it.
 const MAX_THICKNESS: f64 = 0.25;
+/// Largest distance of a hit from the line through those beside it, metres, for all three to be on a wall though they
+/// lie far apart: ranges deviate by one or two centimetres, and most of that is along a wall that is grazed.
+const MAX_BEND: f64 = 0.02;
 
 /// A hit of a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,29 +51,69 @@ pub fn scan_points(hits: &[Point2], lidar: &Point2) -> Vec<ScanPoint> {
             break;
         }
         kept = Some(*place);
-        points.push(ScanPoint { place: *place, normal: normal(hits, index, lidar) });
+        let normal = match surface(hits, index, lidar) {
+            Surface::Wall(normal) => Some(normal),
+            Surface::Spot => None,
+            Surface::Grazed => continue,
+        };
+        points.push(ScanPoint { place: *place, normal });
     }
     points
 }
 
-/// The normal of the line through the hits around one of them: the direction in which they vary least.
-fn normal(hits: &[Point2], index: usize, lidar: &Point2) -> Option<Vector2<f64>> {
+/// What a hit lies on.
+enum Surface {
+    /// A wall with this normal.
+    Wall(Vector2<f64>),
+    /// A corner, clutter, or an object of the width of a beam.
+    Spot,
+    /// A place at which a beam happens to meet a wall that it grazes, or the edge of a shadow. It goes with the lidar.
+    Grazed,
+}
+
+/// The surface at one of the hits.
+fn surface(hits: &[Point2], index: usize, lidar: &Point2) -> Surface {
     let at = hits[index];
+    let [before, after] = [index.checked_sub(1).and_then(|before| hits.get(before)), hits.get(index + 1)];
     let beside = |other: Option<&Point2>| other.map_or(f64::INFINITY, |other| (other - at).norm());
-    let nearest = beside(index.checked_sub(1).and_then(|before| hits.get(before))).min(beside(hits.get(index + 1)));
-    let radius = (NORMAL_BEAMS * nearest).clamp(NORMAL_RADIUS, MAX_NORMAL_RADIUS);
+    let radius = (NORMAL_BEAMS * beside(before).min(beside(after))).clamp(NORMAL_RADIUS, MAX_NORMAL_RADIUS);
     let is_near = |other: &&Point2| (*other - at).norm() <= radius;
-    let before = hits[..index].iter().rev().take(MAX_NEIGHBOURS).take_while(is_near);
-    let after = hits[index + 1..].iter().take(MAX_NEIGHBOURS).take_while(is_near);
+    let near_before = hits[..index].iter().rev().take(MAX_NEIGHBOURS).take_while(is_near);
+    let near_after = hits[index + 1..].iter().take(MAX_NEIGHBOURS).take_while(is_near);
+    let near = near_before.chain(near_after);
+    if near.clone().nth(1).is_some() {
+        return match normal(&at, near, lidar) {
+            Some(normal) => Surface::Wall(normal),
+            None => Surface::Spot,
+        };
+    }
+    let range = (at - lidar).norm();
+    let is_behind = |other: Option<&Point2>| other.is_some_and(|other| (other - lidar).norm() > range);
+    if is_behind(before) && is_behind(after) {
+        return Surface::Spot;
+    }
+    match (before, after) {
+        (Some(before), Some(after)) if is_between(&at, before, after) => {
+            normal(&at, [before, after].into_iter(), lidar).map_or(Surface::Grazed, Surface::Wall)
+        }
+        _ => Surface::Grazed,
+    }
+}
+
+/// Whether a point lies on the line between two others.
+fn is_between(at: &Point2, before: &Point2, after: &Point2) -> bool {
+    let (along, arm) = (after - before, at - before);
+    along.perp(&arm).abs() <= MAX_BEND * along.norm()
+}
+
+/// The normal of the line through a hit and others: the direction in which they vary least.
+fn normal<'a>(at: &Point2, others: impl Iterator<Item = &'a Point2>, lidar: &Point2) -> Option<Vector2<f64>> {
     let (mut count, mut sum, mut squares) = (1.0, Vector2::zeros(), Matrix2::zeros());
-    for other in before.chain(after) {
+    for other in others {
         let arm = other - at;
         count += 1.0;
         sum += arm;
         squares += arm * arm.transpose();
-    }
-    if count < 3.0 {
-        return None;
     }
     let mean = sum / count;
     let covariance = squares / count - mean * mean.transpose();
@@ -111,9 +154,24 @@ mod tests {
     }
 
     #[test]
-    fn a_lone_hit_and_clutter_have_no_normal() {
-        let lone = scan_points(&[Point2::new(1.0, 0.0), Point2::new(3.0, 2.0)], &Point2::origin());
-        assert!(lone.iter().all(|point| point.normal.is_none()));
+    fn hits_that_lie_far_apart_are_on_a_wall_or_in_front_of_one_or_say_nothing() {
+        let hits = |places: &[(f64, f64)]| {
+            let hits: Vec<Point2> = places.iter().map(|&(x, y)| Point2::new(x, y)).collect();
+            scan_points(&hits, &Point2::origin())
+        };
+        // Along a wall of a corridor, whose first and last hit have one neighbour only.
+        let wall = hits(&[(6.0, 1.0), (7.0, 1.01), (8.5, 1.0), (11.0, 1.0)]);
+        assert!(wall.iter().all(|point| point.normal.is_some_and(|normal| normal.y < -0.99)), "{wall:?}");
+        assert_eq!(wall.iter().map(|point| point.place.x).collect::<Vec<_>>(), [7.0, 8.5]);
+        // The leg of a table in front of it, and a hit in an open door, which goes along with the lidar.
+        let leg = hits(&[(6.0, 1.0), (5.0, 0.7), (8.5, 1.0)]);
+        assert_eq!((leg.len(), leg[0]), (1, ScanPoint { place: Point2::new(5.0, 0.7), normal: None }));
+        let door = hits(&[(6.0, 1.0), (7.5, 1.3), (8.5, 1.0)]);
+        assert!(door.is_empty(), "{door:?}");
+    }
+
+    #[test]
+    fn clutter_has_no_normal() {
         let clutter = [(1.0, 0.0), (1.08, 0.05), (1.0, 0.1), (1.09, 0.12), (1.01, 0.16)];
         let clutter: Vec<Point2> = clutter.iter().map(|&(x, y)| Point2::new(x, y)).collect();
         assert!(scan_points(&clutter, &Point2::origin())[2].normal.is_none());

@@ -9,6 +9,7 @@ use super::scan_points::ScanPoint;
 use super::scan_registration::{WELL_MATCHED, register};
 use crate::shared::geometry::Pose2;
 use nalgebra::{Matrix3, UnitComplex, Vector2, Vector3};
+use std::cell::OnceCell;
 use std::ops::Range;
 
 /// Number of scans before one that make up its local map, at most, and the path that they may span, metres.
@@ -37,6 +38,9 @@ pub struct LocatedScan {
     pub pose: Pose2,
     /// Whether most of its points lie on the map.
     pub is_sure: bool,
+    /// Standard deviation of its position by its walls alone in the direction in which they show it least, metres.
+    /// It is large between two parallel walls.
+    pub deviation: f64,
 }
 
 /// The scans of a robot with their poses, in the frame of the first.
@@ -53,6 +57,8 @@ pub struct Trajectory {
     submap_start: usize,
     /// Earlier submaps that are part of the local map.
     revisited: Vec<usize>,
+    /// The local map, once it was asked for since the last change.
+    local_map: OnceCell<LocalMap>,
     unmatched: usize,
 }
 
@@ -68,6 +74,7 @@ impl Trajectory {
             submaps: Vec::new(),
             submap_start: 0,
             revisited: Vec::new(),
+            local_map: OnceCell::new(),
             unmatched: 0,
         }
     }
@@ -108,8 +115,7 @@ impl Trajectory {
         let guess = last * moved;
         let by_odometry = self.noise.information(moved);
         let prior = turned_information(&by_odometry, &last.rotation);
-        let map = self.local_map();
-        let found = register(&map, &points, &guess, &prior, self.noise.deviations(moved));
+        let found = register(self.local_map(), &points, &guess, &prior, self.noise.deviations(moved));
         let is_matched = found.matched >= LEAST_MATCHED;
         let pose = if is_matched { found.pose } else { guess };
         self.unmatched += usize::from(!is_matched);
@@ -135,12 +141,17 @@ impl Trajectory {
         let [place, yaw] = deviations.map(|deviation| deviation.powi(-2));
         let information = Matrix3::from_diagonal(&Vector3::new(place, place, yaw));
         let information = turned_information(&information, &last.rotation);
-        let found = register(&self.local_map(), points, &(last * guess), &information, deviations);
-        (found.matched >= LEAST_MATCHED)
-            .then(|| LocatedScan { pose: last.inv_mul(&found.pose), is_sure: found.matched >= WELL_MATCHED })
+        let found = register(self.local_map(), points, &(last * guess), &information, deviations);
+        let of_position = found.information.fixed_view::<2, 2>(0, 0).into_owned();
+        (found.matched >= LEAST_MATCHED).then(|| LocatedScan {
+            pose: last.inv_mul(&found.pose),
+            is_sure: found.matched >= WELL_MATCHED,
+            deviation: of_position.symmetric_eigenvalues().min().max(0.0).sqrt().recip(),
+        })
     }
 
     fn push(&mut self, pose: Pose2, way: f64, points: Vec<ScanPoint>) {
+        self.local_map.take();
         self.graph.poses.push(pose);
         self.paths.push(self.paths.last().map_or(0.0, |path| path + way));
         self.scans.push(points);
@@ -154,11 +165,13 @@ impl Trajectory {
     }
 
     /// The last scans, and the earlier submaps around the robot.
-    fn local_map(&self) -> LocalMap {
-        let recent = self.recent();
-        let revisited = self.revisited.iter().flat_map(|submap| self.submaps[*submap].clone());
-        let scans = revisited.filter(|scan| *scan < recent).chain(recent..self.scans.len());
-        LocalMap::new(scans.map(|scan| (self.graph.poses[scan], &self.scans[scan][..])))
+    fn local_map(&self) -> &LocalMap {
+        self.local_map.get_or_init(|| {
+            let recent = self.recent();
+            let revisited = self.revisited.iter().flat_map(|submap| self.submaps[*submap].clone());
+            let scans = revisited.filter(|scan| *scan < recent).chain(recent..self.scans.len());
+            LocalMap::new(scans.map(|scan| (self.graph.poses[scan], &self.scans[scan][..])))
+        })
     }
 
     /// Finishes the submap of the last scans, and looks for loop closures. Returns whether one has moved earlier
@@ -179,6 +192,7 @@ impl Trajectory {
             self.graph.optimize();
         }
         self.revisited = self.tied_submaps(recent);
+        self.local_map.take();
         has_moved
     }
 
@@ -208,6 +222,7 @@ impl Trajectory {
             }
         }
         self.hold(&start);
+        self.local_map.take();
         has_moved
     }
 
