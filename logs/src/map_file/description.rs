@@ -18,7 +18,14 @@ pub(super) struct Description {
     /// x and y of the lower left corner, metres, and yaw, radians.
     pub(super) origin: [f64; 3],
     pub(super) reading: Reading,
+    /// What the file leaves out or writes in other units, and how that was read.
+    pub(super) assumed: Vec<String>,
 }
+
+/// The thresholds of a file without any: those of ROS map servers and savers.
+const USUAL_THRESHOLDS: [(&str, f64); 2] = [("occupied_thresh", 0.65), ("free_thresh", 0.196)];
+/// A threshold from here on, up to 100, is in percent.
+const LEAST_PERCENT: f64 = 5.0;
 
 /// The fields of the file. Other fields, which some programs add, are ignored.
 #[derive(Deserialize)]
@@ -26,8 +33,8 @@ struct Fields {
     image: PathBuf,
     resolution: Number,
     origin: Vec<Number>,
-    occupied_thresh: Number,
-    free_thresh: Number,
+    occupied_thresh: Option<Number>,
+    free_thresh: Option<Number>,
     #[serde(default)]
     negate: Value,
     mode: Option<String>,
@@ -68,7 +75,6 @@ impl Description {
         let wrong = |field, problem: String| MapFileError::Field { path: path.to_owned(), field, problem };
 
         let Fields { image, resolution: Number(metres), origin, .. } = fields;
-        let (Number(occupied_thresh), Number(free_thresh)) = (fields.occupied_thresh, fields.free_thresh);
         if image.as_os_str().is_empty() {
             return Err(wrong("image", "is empty; it must be the image file".into()));
         }
@@ -77,7 +83,12 @@ impl Description {
             let problem = format!("is {metres}; it must be the size of a cell in metres, above 0");
             return Err(wrong("resolution", problem));
         }
-        let origin: Vec<f64> = origin.into_iter().map(|Number(value)| value).collect();
+        let mut assumed = Vec::new();
+        let mut origin: Vec<f64> = origin.into_iter().map(|Number(value)| value).collect();
+        if origin.len() == 2 {
+            assumed.push("its `origin` has no yaw, which is read as 0".to_owned());
+            origin.push(0.0);
+        }
         // `[1,5, 2,5, 0,0]` is six numbers.
         let sign = if origin.len() > 3 { "; the decimal sign is a point" } else { "" };
         let origin = <[f64; 3]>::try_from(origin)
@@ -87,11 +98,23 @@ impl Description {
                 let problem = format!("must be three finite numbers: [x, y, yaw], metres and radians{sign}");
                 wrong("origin", problem)
             })?;
-        for (field, value) in [("occupied_thresh", occupied_thresh), ("free_thresh", free_thresh)] {
-            if !(0.0..=1.0).contains(&value) {
-                return Err(wrong(field, format!("is {value}; it must be between 0 and 1")));
-            }
+        let mut thresholds = [0.0; 2];
+        let written = [fields.occupied_thresh, fields.free_thresh];
+        for ((threshold, (field, usual)), written) in thresholds.iter_mut().zip(USUAL_THRESHOLDS).zip(written) {
+            *threshold = match written {
+                None => {
+                    assumed.push(format!("it has no `{field}`, which is read as {usual}"));
+                    usual
+                }
+                Some(Number(value)) if (0.0..=1.0).contains(&value) => value,
+                Some(Number(percent)) if (LEAST_PERCENT..=100.0).contains(&percent) => {
+                    assumed.push(format!("its `{field}`, {percent}, is read as percent: {}", percent / 100.0));
+                    percent / 100.0
+                }
+                Some(Number(value)) => return Err(wrong(field, format!("is {value}; it must be between 0 and 1"))),
+            };
         }
+        let [occupied_thresh, free_thresh] = thresholds;
         if free_thresh > occupied_thresh {
             let problem = format!("is {free_thresh}; it must not be above `occupied_thresh`, {occupied_thresh}");
             return Err(wrong("free_thresh", problem));
@@ -111,7 +134,7 @@ impl Description {
         };
         let reading =
             Reading { mode, negate, occupied_thresh, free_thresh, unknown: None, transparent_is_unknown: false };
-        Ok(Self { image, resolution, origin, reading })
+        Ok(Self { image, resolution, origin, reading, assumed })
     }
 }
 

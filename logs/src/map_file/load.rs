@@ -32,7 +32,7 @@ pub fn load(yaml: &Path) -> Result<GridMap, MapFileError> {
 /// A file cannot be read, or is not a map.
 pub fn load_as(yaml: &Path, thresholds: Thresholds) -> Result<(GridMap, Option<MapFileWarning>), MapFileError> {
     let (description, missing) = describe(yaml)?;
-    let Description { image: path, resolution, origin: [x, y, yaw], reading } = description;
+    let Description { image: path, resolution, origin: [x, y, yaw], reading, assumed } = description;
     let wrong = |message: String| MapFileError::Image { path: path.clone(), yaml: yaml.to_owned(), message };
     let shades = input_file::read(&path, LARGEST_IMAGE)
         .map_err(image::ImageError::from)
@@ -51,6 +51,7 @@ pub fn load_as(yaml: &Path, thresholds: Thresholds) -> Result<(GridMap, Option<M
     let cells =
         shades.cells(|samples, white| reading.pixel(samples, white)).map_err(|error| wrong(error.to_string()))?;
     let warning = MapFileWarning {
+        assumed,
         image: missing.map(|missing| (missing, path.clone())),
         inverted: more_occupied_than_free(&cells),
         ..warning

@@ -192,22 +192,42 @@ fn invalid_values_are_reported_with_valid_ones() {
     assert!(error("image: [").contains("does not describe a map"));
     let without =
         |field: &str| error(&yaml("").lines().filter(|line| !line.starts_with(field)).collect::<Vec<_>>().join("\n"));
-    for field in ["image", "resolution", "origin", "occupied_thresh", "free_thresh"] {
+    for field in ["image", "resolution", "origin"] {
         assert!(without(field).contains(&format!("missing field `{field}`")), "{}", without(field));
     }
     let with = |from: &str, to: &str| error(&yaml("").replace(from, to));
     for value in [".nan", "0", "-0.05", "1e-60", ".inf"] {
         assert!(with("0.05", value).contains("`resolution` is"), "{}", with("0.05", value));
     }
-    for value in ["[0, 0]", "[0, 0, 0, 0]", "[0, .nan, 0]", "[]"] {
+    for value in ["[0]", "[0, 0, 0, 0]", "[0, .nan, 0]", "[]"] {
         assert!(with("[1, -2.5, 0.5]", value).contains("`origin` must be three finite numbers"));
     }
-    assert!(with("0.65", "65").contains("`occupied_thresh` is 65; it must be between 0 and 1"));
+    for value in ["1.5", "-0.1", "255", ".nan"] {
+        assert!(with("0.65", value).contains("it must be between 0 and 1"), "{}", with("0.65", value));
+    }
     assert!(with("0.65", "0.1").contains("`free_thresh` is 0.25; it must not be above `occupied_thresh`, 0.1"));
     assert!(error(&yaml("negate: perhaps")).contains("`negate` must be 0 or 1"));
     assert_eq!(
         error(&yaml("mode: trinery")),
         "DIR/map.yaml: `mode` is `trinery`, but only trinary, scale and raw exist; did you mean `trinary`?"
+    );
+}
+
+#[test]
+fn thresholds_and_a_yaw_that_are_left_out_and_thresholds_in_percent_are_read_with_a_warning() {
+    let (_folder, path) = folder("image: map.pgm\nresolution: 0.05\norigin: [1, -2.5]");
+    let (map, warning) = load_as(&path, Thresholds::Literal).unwrap();
+    assert_eq!((map.info.origin.orientation.yaw(), map.cells), (0.0, cells(&yaml("").replace("0.25", "0.196"))));
+    let expected = "its `origin` has no yaw, which is read as 0; it has no `occupied_thresh`, which is read as 0.65; it has no \
+                    `free_thresh`, which is read as 0.196";
+    assert_eq!(warning.unwrap().to_string(), expected);
+    let percent = yaml("").replace("0.65", "65").replace("0.25", "25.0");
+    assert_eq!(cells(&percent), cells(&yaml("")));
+    let (_folder, path) = folder(&percent);
+    let warning = load_as(&path, Thresholds::Literal).unwrap().1.unwrap().to_string();
+    assert!(
+        warning.starts_with("its `occupied_thresh`, 65, is read as percent: 0.65; its `free_thresh`, 25"),
+        "{warning}"
     );
 }
 

@@ -6,6 +6,8 @@ use std::path::PathBuf;
 /// The deviations from a map file's literal content.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MapFileWarning {
+    /// What the YAML file leaves out or writes in other units, and how that was read.
+    pub assumed: Vec<String>,
     /// The image of the file that cannot be reached, and the one that was read instead.
     pub image: Option<(PathBuf, PathBuf)>,
     /// The cells in the grey of unknown ones.
@@ -58,7 +60,7 @@ impl MapFileWarning {
 
 impl fmt::Display for MapFileWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut parts = Vec::new();
+        let mut parts = self.assumed.clone();
         if let Some((missing, read)) = &self.image {
             parts.push(format!("its image {} cannot be reached; {} is read", missing.display(), read.display()));
         }
