@@ -11,7 +11,7 @@ use gridweave_runtime::message::{Channel, LogTime};
 use gridweave_runtime::ros::Header;
 use serde::Serialize;
 use std::borrow::Cow;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A topic.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -55,6 +55,8 @@ const MOST_FRAMES: usize = 10;
 pub(super) struct Topics {
     /// By file and channel number: the index of the entry, once known.
     known: Vec<Vec<Option<usize>>>,
+    /// By topic, type and encoding: the index of the entry.
+    by_name: BTreeMap<[String; 3], usize>,
     entries: Vec<Entry>,
 }
 
@@ -69,7 +71,7 @@ pub(super) struct Entry {
 impl Topics {
     /// No topics, for so many files.
     pub(super) fn new(files: usize) -> Self {
-        Self { known: vec![Vec::new(); files], entries: Vec::new() }
+        Self { known: vec![Vec::new(); files], by_name: BTreeMap::new(), entries: Vec::new() }
     }
 
     /// The topics, in the order of their first messages.
@@ -149,7 +151,8 @@ impl Topics {
             Some(index) => index,
             None => {
                 let channel = names.channel(file, number)?;
-                let index = self.entries.iter().position(|entry| entry.is_of(channel)).unwrap_or(self.entries.len());
+                let key = [&channel.topic, &channel.schema_name, &channel.message_encoding].map(String::clone);
+                let index = *self.by_name.entry(key).or_insert(self.entries.len());
                 if index == self.entries.len() {
                     let (role, robot) = survey.classify(channel);
                     let header = HeaderPlace::of(channel);
@@ -163,14 +166,6 @@ impl Topics {
             }
         };
         self.entries.get_mut(index)
-    }
-}
-
-impl Entry {
-    fn is_of(&self, channel: &Channel) -> bool {
-        self.info.topic == channel.topic
-            && self.info.type_name == channel.schema_name
-            && self.info.encoding == channel.message_encoding
     }
 }
 
