@@ -39,8 +39,12 @@ pub(super) fn obstacles_are_inflated(width: usize, cells: &[i8]) -> bool {
 /// them.
 pub(super) fn without_costs(width: usize, cells: &[i8]) -> Vec<i8> {
     let is_cost = |value: i8| (1..LETHAL).contains(&value);
-    let mut read: Vec<i8> = cells.iter().map(|value| if is_cost(*value) { i8::MIN } else { *value }).collect();
-    read.iter_mut().filter(|value| !cell::is_known(**value) && **value != i8::MIN).for_each(|value| *value = -1);
+    let unflooded = |value: i8| match value {
+        _ if is_cost(value) => i8::MIN,
+        _ if cell::is_known(value) => value,
+        _ => cell::UNKNOWN,
+    };
+    let mut read: Vec<i8> = cells.iter().map(|value| unflooded(*value)).collect();
     let mut queue = BinaryHeap::new();
     let mut order = 0_u64;
     let mut flood = |from: usize, read: &mut [i8], queue: &mut BinaryHeap<Reverse<(i8, u64, usize)>>| {
