@@ -118,6 +118,7 @@ fn look(inputs: &[Input], rules: &NameRules, robots: &RobotTopics, large: u64) -
     let mut info = LogInfo { is_sampled, note: names.note().map(str::to_owned), ..Default::default() };
     info.files = files.iter().enumerate().map(|(number, file)| file_info(file, names.robot_of_file(number))).collect();
     let mut survey = RobotSurvey::new(robots.clone(), names.channels());
+    survey.set_given_robots(names.given_robots());
     survey.set_one_map(OneMap::read(&files, &names, robots));
     let mut topics = Topics::new(files.len());
     let mut times = read(&mut reader, &names, &mut topics, &mut survey, &mut info);

@@ -4,8 +4,8 @@ mod problems;
 
 use crate::one_map::OneMap;
 use crate::robots::{
-    Classified, InferredPoses, MapOrigin, MergedMaps, PoseSource, RobotChannels, Role, TagReader, is_scan,
-    pose_with_covariance,
+    Classified, InferredPoses, MapOrigin, MergedMaps, PoseSource, RobotChannels, Role, TagReader, doubtful, is_scan,
+    left_out, pose_with_covariance,
 };
 use crate::schemas::full_type_name;
 use crate::tf::{TfPoses, is_static};
@@ -64,8 +64,8 @@ pub(super) struct RobotSurvey {
     merged_maps: MergedMaps,
     /// By robot: the topic of its maps, and the frame of the first.
     map_frames: BTreeMap<String, (String, String)>,
-    /// Topics of merged maps of other programs.
-    merged_topics: BTreeSet<String>,
+    /// What is said of maps that are merged ones of other programs or may be, and of lidars that are not read.
+    notes: BTreeSet<String>,
     /// The robots that localise in one map.
     one_map: Option<OneMap>,
     robots: BTreeMap<String, RobotInfo>,
@@ -96,11 +96,16 @@ impl RobotSurvey {
             unusable_maps: BTreeMap::new(),
             merged_maps: MergedMaps::default(),
             map_frames: BTreeMap::new(),
-            merged_topics: BTreeSet::new(),
+            notes: BTreeSet::new(),
             one_map: None,
             robots: BTreeMap::new(),
             unreadable: BTreeMap::new(),
         }
+    }
+
+    /// Sets the robots that the user has named.
+    pub(super) fn set_given_robots(&mut self, given: &BTreeSet<String>) {
+        self.merged_maps = MergedMaps::new(given.clone());
     }
 
     /// Sets the robots that localise in one map.
@@ -216,9 +221,7 @@ impl RobotSurvey {
             *self.unreadable.entry(topic.to_owned()).or_default() += 1;
             return;
         };
-        if is_static(topic) {
-            self.merged_maps.add_transforms(&message);
-        }
+        self.merged_maps.add_transforms(&message);
         self.inferred.odometry(prefix, is_static(topic), &message);
         let (poses, _) = match &mut self.tf {
             Some(tf) => tf.update(prefix, is_static(topic), &message),
@@ -240,15 +243,21 @@ impl RobotSurvey {
     /// Removes the robots whose maps are merged ones of other programs. Call it once all messages were added.
     pub(super) fn remove_merged_maps(&mut self) {
         let frames = std::mem::take(&mut self.map_frames);
-        let mut origin = |robot: &str, frame: &str| self.merged_maps.origin(robot, frame, self.roles.mapped());
+        let mut origin = |robot: &str, frame: &str| self.merged_maps.origin(robot, frame, &self.roles);
         // The frames of all robots decide.
         for (robot, (_, frame)) in &frames {
             origin(robot, frame);
         }
         for (robot, (topic, frame)) in &frames {
-            if origin(robot, frame) == MapOrigin::Merged {
-                self.merged_topics.insert(topic.clone());
-                self.robots.remove(robot);
+            match origin(robot, frame) {
+                MapOrigin::Merged => {
+                    self.notes.insert(left_out(topic, Some(&self.roles.robots_option(None))));
+                    self.robots.remove(robot);
+                }
+                MapOrigin::Doubtful => {
+                    self.notes.insert(doubtful(topic, robot, &self.roles.robots_option(Some(robot))));
+                }
+                MapOrigin::Robot | MapOrigin::Undecided => {}
             }
         }
     }

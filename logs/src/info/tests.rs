@@ -88,7 +88,8 @@ fn maps_that_cannot_be_used_and_merged_maps_are_reported() {
     assert_eq!(info.robots.keys().collect::<Vec<_>>(), ["robot1", "robot2"]);
     for problem in [
         "1 of the maps of robot2 cannot be used: it has 0 cells, but its size is 3 x 1",
-        "maps on `/map_merge/map` are merged ones of another program, and are not used",
+        "maps on `/map_merge/map` are merged ones of another program, and are not taken as a robot's; if they are a robot's, \
+         give --robots map_merge,robot1,robot2",
     ] {
         assert!(info.problems.iter().any(|known| known == problem), "{:?}", info.problems);
     }

@@ -37,7 +37,7 @@ use crate::reader::{LogFile, LogMessage, LogReader, log_files};
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::stage::RobotTopics;
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -49,6 +49,8 @@ pub struct Names {
     /// By file: the robot that the whole file was put under.
     robots: Vec<Option<String>>,
     note: Option<String>,
+    /// The robots that the user has named.
+    given: BTreeSet<String>,
 }
 
 /// Opens logs and names their channels. `robots` are the topic patterns.
@@ -100,6 +102,11 @@ impl Names {
     /// The robot that a whole file was put under.
     pub fn robot_of_file(&self, file: usize) -> Option<&str> {
         self.robots.get(file)?.as_deref()
+    }
+
+    /// The robots that the user has named: those of inputs, and those that are to be read.
+    pub(crate) fn given_robots(&self) -> &BTreeSet<String> {
+        &self.given
     }
 
     /// A note for the user about robot names that were inferred, if any.

@@ -99,7 +99,8 @@ pub(super) fn name(
             of_file.insert(number, named.logged_as(logged_as(file)));
         }
     }
-    Ok(Names { channels, robots: robot_of_file, note })
+    let given = inputs.iter().filter_map(|input| input.robot.clone()).chain(rules.robots.iter().cloned()).collect();
+    Ok(Names { channels, robots: robot_of_file, note, given })
 }
 
 /// The channels of all files, with the user's renames applied. Where robots are looked for, channels without messages

@@ -23,6 +23,8 @@ const EVEN_ODDS: i8 = 50;
 const EVEN_SPREAD: f64 = 0.75;
 /// The least difference of the means of two classes of values, if they are not 0 and one other value.
 const LEAST_CONTRAST: f64 = 20.0;
+/// No map has so many times more walls than free space.
+const MORE_THAN_WALLS: u64 = 2;
 
 /// How the values of cells are read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -43,6 +45,8 @@ pub enum CellValues {
     /// The larger of two classes of values is occupied and the smaller free, whatever they are: 0 and 1, 30 and 70, 25
     /// and 100.
     TwoClasses,
+    /// The smaller of two classes of values is occupied and the larger free: the shades of an image.
+    Inverted,
 }
 
 /// The meaning of the values of one map's cells.
@@ -71,6 +75,22 @@ impl fmt::Display for Convention {
             }
         }
     }
+}
+
+/// Why the values of cells may have the opposite meaning: there are two of them, and the larger, which is taken for
+/// walls, has more cells than the smaller; with the option that reads them so.
+pub(crate) fn inversion_of(cells: &[i8]) -> Option<String> {
+    let counts = Counts::of(cells);
+    let mut values = counts.0.iter().enumerate().filter(|(_, count)| **count > 0);
+    let (Some((smaller, few)), Some((larger, many)), None) = (values.next(), values.next(), values.next()) else {
+        return None;
+    };
+    (*many > MORE_THAN_WALLS * few).then(|| {
+        format!(
+            "{many} cells have the value {larger} and {few} the value {smaller}, so that most would be walls, or none: if the \
+             walls have the value {smaller}, give --set log.map_values=inverted"
+        )
+    })
 }
 
 impl CellValues {
@@ -123,6 +143,10 @@ impl CellValues {
             Self::Costmap => Convention::Costmap,
             Self::Probabilities => Convention::Probabilities,
             Self::TwoClasses => classes(Counts::of(cells).classes()),
+            Self::Inverted => match classes(Counts::of(cells).classes()) {
+                Convention::TwoClasses { free, occupied } => Convention::TwoClasses { free: occupied, occupied: free },
+                convention => convention,
+            },
             Self::Auto => {
                 let counts = Counts::of(cells);
                 let has = |is: fn(i8) -> bool| (0..=LETHAL).any(|value| is(value) && counts.of_value(value) > 0);
@@ -293,6 +317,20 @@ mod tests {
     }
 
     #[test]
+    fn of_two_values_the_larger_of_which_has_most_cells_the_smaller_may_be_walls() {
+        for (wall, free) in [(0, 1), (0, 100), (30, 70)] {
+            let cells = [N, free, free, free, wall, free, N];
+            let text = inversion_of(&cells).unwrap();
+            let found = format!("4 cells have the value {free} and 1 the value {wall}");
+            assert!(text.starts_with(&found) && text.ends_with("--set log.map_values=inverted"), "{text}");
+            assert_eq!(read(CellValues::Inverted, 7, &cells).0, [N, 0, 0, 0, 100, 0, N]);
+        }
+        for cells in [&[0, 0, 0, 100, N][..], &[0, 100, 100], &[0, 1, 2, 2, 2, 2, 2], &[1, 1, 1], &[N], &[]] {
+            assert_eq!(inversion_of(cells), None, "{cells:?}");
+        }
+    }
+
+    #[test]
     fn values_of_one_class_are_left_as_they_are() {
         let spread: Vec<i8> = (20..50).collect();
         for cells in [&spread[..], &[0, 1, 2, 3, 2, 1, 0], &[40, 40, 41], &[1, 1, 1, 0]] {
@@ -311,6 +349,7 @@ mod tests {
         assert_eq!(read(CellValues::Auto, 10, &costmap()), (expected.clone(), Convention::Costmap));
         assert_eq!(read(CellValues::Costmap, 10, &costmap()).0, expected);
         assert_eq!(read(CellValues::Occupancy, 10, &costmap()).0, costmap());
+        assert_eq!(read(CellValues::Costmap, 2, &[0, -128]).0, [0, N], "every value out of range is unknown");
     }
 
     #[test]

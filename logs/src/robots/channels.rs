@@ -2,11 +2,12 @@
 
 use super::channel_patterns::{ChannelPatterns, tag_message};
 use super::role::{Classified, PoseSource, Role};
-use super::tag_reader::{TagReader, has_poses_in_tf};
+use super::tag_reader::{TagReader, has_poses_in_tf, known_fields};
 use crate::robot_name::fits;
 use crate::schemas::full_type_name;
 use crate::tf::tf_topic;
 use gridweave_runtime::message::{Channel, LONGEST_ROBOT_NAME, LONGEST_TOPIC, shortened};
+use gridweave_runtime::ros::{Odometry, PointCloud2, PoseStamped, PoseWithCovarianceStamped, RosMessage, TagRange};
 use gridweave_runtime::stage::{RobotTopics, TagFields};
 use std::collections::BTreeMap;
 
@@ -36,6 +37,8 @@ struct RobotData {
     has_odometry: bool,
     /// Whether detectors in the robot's namespace publish the poses of tags in tf only.
     has_tags_in_tf: bool,
+    /// Whether the robot's namespace has messages of a body: of sensors, poses or commands.
+    has_body: bool,
 }
 
 impl RobotData {
@@ -106,6 +109,17 @@ impl RobotChannels {
     /// Robots with scans and without maps, sorted by name.
     pub(crate) fn scanned(&self) -> impl Iterator<Item = &str> {
         self.robots(RobotData::is_scanned)
+    }
+
+    /// Whether a robot has anything but maps.
+    pub(crate) fn has_more_than_maps(&self, robot: &str) -> bool {
+        self.data(robot).has_body
+    }
+
+    /// The option `--robots` that names all robots with maps, or all but one of them.
+    pub(crate) fn robots_option(&self, but: Option<&str>) -> String {
+        let robots: Vec<&str> = self.robots(RobotData::is_known).filter(|robot| Some(*robot) != but).collect();
+        format!("--robots {}", robots.join(","))
     }
 
     /// Whether a robot without a pose topic has an odometry topic.
@@ -210,6 +224,11 @@ fn data_of_robots(patterns: &ChannelPatterns, channels: &[&Channel]) -> BTreeMap
         };
         let data = robots.entry(robot.to_owned()).or_default();
         data.has_maps |= role == Role::Map;
+        if is_of_a_body(&full_type_name(&channel.schema_name))
+            && let Some(robot) = patterns.namespace(topic)
+        {
+            robots.entry(robot.to_owned()).or_default().has_body = true;
+        }
         data.has_map_updates |= role == Role::MapUpdate;
         data.needs_poses |= matches!(role, Role::Map | Role::Tags | Role::TagMessage);
         data.has_poses |= matches!(role, Role::Pose(_));
@@ -224,6 +243,20 @@ fn role_by_type<'a>(patterns: &ChannelPatterns, channel: &'a Channel) -> Option<
     if let Some((robot, fields)) = patterns.tag_fields(channel, |_| false) {
         return Some((tag_message(channel, robot, &fields).role, robot));
     }
+/// Whether messages of a type are those of a robot's body. Point clouds are not: they may be maps.
+fn is_of_a_body(type_name: &str) -> bool {
+    const TYPES: [&str; 6] = [
+        Odometry::NAME,
+        PoseStamped::NAME,
+        PoseWithCovarianceStamped::NAME,
+        TagRange::NAME,
+        "geometry_msgs/msg/Twist",
+        "geometry_msgs/msg/TwistStamped",
+    ];
+    let is_sensor = type_name.starts_with("sensor_msgs/") && type_name != PointCloud2::NAME;
+    is_sensor || TYPES.contains(&type_name) || known_fields(type_name).is_some()
+}
+
     let named = patterns.named(channel);
     if named.role != Role::Other {
         return Some((named.role, named.robot));
@@ -235,9 +268,7 @@ fn role_by_type<'a>(patterns: &ChannelPatterns, channel: &'a Channel) -> Option<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gridweave_runtime::ros::{
-        LaserScan, OccupancyGrid, Odometry, PoseStamped, PoseWithCovarianceStamped, RosMessage, TFMessage,
-    };
+    use gridweave_runtime::ros::{LaserScan, OccupancyGrid, TFMessage};
 
     #[test]
     fn roles_do_not_depend_on_the_order_of_the_channels() {

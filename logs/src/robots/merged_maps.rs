@@ -1,5 +1,6 @@
 //! Merged maps of other programs among the maps of robots.
 
+use super::RobotChannels;
 use gridweave_runtime::ros::TFMessage;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,77 +8,137 @@ use std::collections::{BTreeMap, BTreeSet};
 const WORLD: &str = "world";
 /// The name of a robot's map frame, behind its own.
 const OWN: &str = "map";
-/// The least number of robots whose maps show that another one is made of them.
-const LEAST_PARTS: usize = 2;
-
+/// The last part of the names of frames that only a robot has.
+const BODIES: [&str; 3] = ["odom", "base_link", "base_footprint"];
+/// Parts of the names of programs that merge maps.
+const MERGERS: [&str; 4] = ["merg", "fused", "combined", "stitch"];
 /// Whose map a grid is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum MapOrigin {
     /// The robot's of its topic.
     Robot,
+    /// The robot's of its topic, of which there is nothing else, beside two robots of which there is.
+    Doubtful,
     /// That of a program that merges the maps of robots.
     Merged,
     /// The frames of other maps decide, which were not seen yet.
     Undecided,
 }
 
-/// Distinguishes merged maps from those of robots. A map is a merged one if its frame is the parent of the map frames
-/// of two other robots, or if it is the world's and two others have maps in frames of their own.
+/// Distinguishes merged maps from those of robots. Whatever has more than maps, or was named by the user, is a robot.
+/// Of the others, beside two robots at the least, a map is a merged one if its frame is
+/// - the parent of the map frames of two robots,
+/// - the map frame of another robot,
+/// - or that of the world, and two robots have maps in frames of their own,
+///
+/// or if its topic names a program that merges maps.
 #[derive(Debug, Default)]
 pub(crate) struct MergedMaps {
-    /// The robots whose maps were seen, and whether they are in frames of their own.
-    seen: BTreeMap<String, bool>,
-    /// The children of each frame by static transforms.
+    /// The robots that the user has named.
+    named: BTreeSet<String>,
+    /// The frames of the maps that were seen, by robot, without its name.
+    seen: BTreeMap<String, String>,
+    /// The children of each frame.
     children: BTreeMap<String, BTreeSet<String>>,
+    /// The robots of which transforms show the body.
+    bodies: BTreeSet<String>,
 }
 
 impl MergedMaps {
-    /// Records static transforms.
+    /// The least number of robots whose maps show that another one is made of them.
+    pub(crate) const LEAST_PARTS: usize = 2;
+
+    /// Knows the robots that the user has named.
+    pub(crate) fn new(named: BTreeSet<String>) -> Self {
+        Self { named, ..Self::default() }
+    }
+
+    /// Records transforms.
     pub(crate) fn add_transforms(&mut self, message: &TFMessage) {
         for edge in &message.transforms {
             let (parent, child) = (plain(&edge.header.frame_id), plain(&edge.child_frame_id));
-            let children = self.children.entry(parent.to_owned()).or_default();
-            if !children.contains(child) {
-                children.insert(child.to_owned());
+            let is_known = self.children.get(parent).is_some_and(|children| children.contains(child));
+            if is_known {
+                continue;
+            }
+            self.children.entry(parent.to_owned()).or_default().insert(child.to_owned());
+            if let Some((robot, _)) = child.rsplit_once('/').filter(|(_, last)| BODIES.contains(last)) {
+                self.bodies.insert(robot.to_owned());
             }
         }
     }
 
-    /// Records a map in `frame`, which by its topic is of `robot`, and finds out whose it is. `mapped` are all robots
-    /// with topics of maps.
-    pub(crate) fn origin<'a>(
-        &mut self,
-        robot: &str,
-        frame: &str,
-        mapped: impl Iterator<Item = &'a str> + Clone,
-    ) -> MapOrigin {
-        // Frames have the names of their robots before them, the frame of a merged map, too.
-        let own = plain(frame);
-        let own = own.strip_prefix(robot).and_then(|rest| rest.strip_prefix('/')).unwrap_or(own);
-        let others = || mapped.clone().filter(|other| *other != robot);
+    /// Records the frame of the first map of a robot.
+    pub(crate) fn add_map(&mut self, robot: &str, frame: &str) {
         if !self.seen.contains_key(robot) {
-            self.seen.insert(robot.to_owned(), own != WORLD);
+            self.seen.insert(robot.to_owned(), own(robot, frame).to_owned());
         }
-        let children = self.children.get(own);
-        let is_child = |other: &&str| {
-            let is_of = |child: &String| child.strip_prefix(*other).is_some_and(|rest| rest.starts_with('/'));
-            children.is_some_and(|children| children.iter().any(is_of))
-        };
-        // `map` is the name of every robot's own map frame.
-        if own != OWN && others().filter(is_child).count() >= LEAST_PARTS {
-            return MapOrigin::Merged;
-        }
-        if own != WORLD {
+    }
+
+    /// Records a map in `frame`, which by its topic is of `robot`, and finds out whose it is.
+    pub(crate) fn origin(&mut self, robot: &str, frame: &str, roles: &RobotChannels) -> MapOrigin {
+        self.add_map(robot, frame);
+        let is_certain = |robot: &str| roles.has_more_than_maps(robot) || self.bodies.contains(robot);
+        if self.named.contains(robot) || is_certain(robot) {
             return MapOrigin::Robot;
         }
-        let in_own_frames = others().filter(|other| self.seen.get(*other) == Some(&true)).count();
-        let unseen = others().filter(|other| !self.seen.contains_key(*other)).count();
+        let own = own(robot, frame);
+        let others = || roles.mapped().filter(|other| *other != robot);
+        let certain = others().filter(|other| is_certain(other)).count();
+        let is_in_map_of = |other: &str| own.strip_prefix(other).is_some_and(|rest| rest.starts_with('/'));
+        let in_own_frame = |other: &&str| self.seen.get(*other).is_some_and(|frame| frame != WORLD);
+        let [robots, own_frames, unseen] = [
+            others().filter(|other| !is_merger(other)).count(),
+            others().filter(in_own_frame).count(),
+            others().filter(|other| !self.seen.contains_key(*other)).count(),
+        ];
+        // `map` is the name of every robot's own map frame.
+        let parts = others().filter(|other| (own != OWN || is_certain(other)) && self.is_child(robot, own, other));
         match () {
-            () if in_own_frames >= LEAST_PARTS => MapOrigin::Merged,
-            () if in_own_frames + unseen >= LEAST_PARTS => MapOrigin::Undecided,
+            () if robots < Self::LEAST_PARTS => MapOrigin::Robot,
+            () if parts.count() >= Self::LEAST_PARTS => MapOrigin::Merged,
+            () if is_merger(robot) || others().any(is_in_map_of) => MapOrigin::Merged,
+            () if own == WORLD && own_frames >= Self::LEAST_PARTS => MapOrigin::Merged,
+            () if own == WORLD && own_frames + unseen >= Self::LEAST_PARTS => MapOrigin::Undecided,
+            () if certain >= Self::LEAST_PARTS => MapOrigin::Doubtful,
             () => MapOrigin::Robot,
         }
     }
+
+    /// Whether transforms connect the map frame of `other` to the frame `own` of a map on the topic of `robot`. On the
+    /// topic for the transforms of all robots, or on that of one of both, the frame may have the name of a robot.
+    fn is_child(&self, robot: &str, own: &str, other: &str) -> bool {
+        let map = format!("{other}/{}", self.seen.get(other).map_or(OWN, String::as_str));
+        let parents = [own.to_owned(), format!("{robot}/{own}"), format!("{other}/{own}")];
+        let has_map = |parent: &String| self.children.get(parent).is_some_and(|children| children.contains(&map));
+        parents.iter().filter(|parent| **parent != map).any(has_map)
+    }
+}
+
+/// What is said of maps on `topic` that are left out. With `option`, the one that takes them in.
+pub(crate) fn left_out(topic: &str, option: Option<&str>) -> String {
+    let cure = option.map_or_else(String::new, |option| format!("; if they are a robot's, give {option}"));
+    format!("maps on `{topic}` are merged ones of another program, and are not taken as a robot's{cure}")
+}
+
+/// What is said of maps on `topic` that are taken in, with the option that leaves them out.
+pub(crate) fn doubtful(topic: &str, robot: &str, option: &str) -> String {
+    format!(
+        "of {robot} there is nothing but maps: if those on `{topic}` are merged ones of another program, give {option}"
+    )
+}
+
+/// Whether a name is that of a program that merges maps.
+fn is_merger(name: &str) -> bool {
+    let name = name.to_lowercase();
+    MERGERS.iter().any(|part| name.contains(part))
+}
+
+/// The name of a frame without that of the robot. Frames have the names of their robots before them, the frame of a
+/// merged map, too.
+fn own<'a>(robot: &str, frame: &'a str) -> &'a str {
+    let frame = plain(frame);
+    frame.strip_prefix(robot).and_then(|rest| rest.strip_prefix('/')).unwrap_or(frame)
 }
 
 /// A frame without the slash that ROS 1 programs put before it.
@@ -87,46 +148,107 @@ fn plain(frame: &str) -> &str {
 
 #[cfg(test)]
 mod tests {
+    use super::MapOrigin::{Doubtful, Merged, Robot, Undecided};
     use super::*;
-    use gridweave_runtime::message::LogTime;
-    use gridweave_runtime::ros::{Header, TransformStamped};
+    use gridweave_runtime::message::{Channel, LogTime};
+    use gridweave_runtime::ros::{Header, OccupancyGrid, PoseStamped, RosMessage, TransformStamped};
+    use gridweave_runtime::stage::RobotTopics;
 
-    const ALL: [&str; 3] = ["a", "b", "map_merge"];
+    /// Channels with a map of each robot, and with a pose of some.
+    fn roles(robots: &[&str], posed: &[&str]) -> RobotChannels {
+        let channel = |topic: String, type_name: &str| Channel {
+            topic,
+            schema_name: type_name.to_owned(),
+            message_encoding: "cdr".to_owned(),
+            ..Default::default()
+        };
+        let maps = robots.iter().map(|robot| channel(format!("/{robot}/map"), OccupancyGrid::NAME));
+        let poses = posed.iter().map(|robot| channel(format!("/{robot}/pose"), PoseStamped::NAME));
+        let channels: Vec<Channel> = maps.chain(poses).collect();
+        RobotChannels::new(RobotTopics::default(), channels.iter())
+    }
+
+    fn all() -> RobotChannels {
+        roles(&["a", "b", "x"], &[])
+    }
 
     fn origins(merged: &mut MergedMaps, maps: &[(&str, &str)]) -> Vec<MapOrigin> {
-        maps.iter().map(|(robot, frame)| merged.origin(robot, frame, ALL.into_iter())).collect()
+        maps.iter().map(|(robot, frame)| merged.origin(robot, frame, &all())).collect()
+    }
+
+    fn edges(edges: &[(&str, &str)]) -> TFMessage {
+        let edge = |(parent, child): &(&str, &str)| TransformStamped {
+            header: Header::new(LogTime(0), *parent),
+            child_frame_id: (*child).into(),
+            ..Default::default()
+        };
+        TFMessage { transforms: edges.iter().map(edge).collect() }
     }
 
     #[test]
     fn a_map_in_the_world_beside_two_in_frames_of_their_own_is_a_merged_one() {
-        use MapOrigin::{Merged, Robot, Undecided};
         let mut merged = MergedMaps::default();
-        let maps = [("map_merge", "map_merge/world"), ("a", "a/map"), ("map_merge", "world"), ("b", "map")];
+        let maps = [("x", "x/world"), ("a", "a/map"), ("x", "world"), ("b", "map")];
         assert_eq!(origins(&mut merged, &maps), [Undecided, Robot, Undecided, Robot]);
-        assert_eq!(origins(&mut merged, &[("map_merge", "/world")]), [Merged]);
+        assert_eq!(origins(&mut merged, &[("x", "/world")]), [Merged]);
     }
 
     #[test]
     fn robots_whose_maps_are_all_in_the_world_are_robots() {
-        use MapOrigin::{Robot, Undecided};
         let mut merged = MergedMaps::default();
-        let maps = [("a", "world"), ("b", "b/world"), ("map_merge", "world"), ("a", "world")];
+        let maps = [("a", "world"), ("b", "b/world"), ("x", "world"), ("a", "world")];
         assert_eq!(origins(&mut merged, &maps), [Undecided, Robot, Robot, Robot]);
-        assert_eq!(MergedMaps::default().origin("a", "world", ["a", "b"].into_iter()), Robot, "one other is too few");
+        let two = roles(&["a", "b"], &[]);
+        assert_eq!(MergedMaps::default().origin("a", "world", &two), Robot, "one other is too few");
     }
 
     #[test]
     fn a_map_in_the_parent_of_two_map_frames_is_a_merged_one() {
         let mut merged = MergedMaps::default();
-        let edge = |child: &str| TransformStamped {
-            header: Header::new(LogTime(0), "common"),
-            child_frame_id: child.into(),
-            ..Default::default()
-        };
-        merged.add_transforms(&TFMessage { transforms: vec![edge("a/map")] });
-        assert_eq!(origins(&mut merged, &[("map_merge", "map_merge/common")]), [MapOrigin::Robot]);
-        merged.add_transforms(&TFMessage { transforms: vec![edge("/b/map")] });
-        assert_eq!(origins(&mut merged, &[("map_merge", "map_merge/common")]), [MapOrigin::Merged]);
-        assert_eq!(origins(&mut merged, &[("a", "a/map")]), [MapOrigin::Robot]);
+        merged.add_transforms(&edges(&[("common", "a/map")]));
+        assert_eq!(origins(&mut merged, &[("x", "x/common")]), [Robot]);
+        merged.add_transforms(&edges(&[("common", "/b/map")]));
+        assert_eq!(origins(&mut merged, &[("x", "x/common"), ("a", "a/map")]), [Merged, Robot]);
+        let mut by_robot = MergedMaps::default();
+        by_robot.add_transforms(&edges(&[("a/common", "a/map"), ("b/common", "b/slam")]));
+        assert_eq!(origins(&mut by_robot, &[("b", "b/slam"), ("x", "x/common")]), [Robot, Merged]);
+    }
+
+    #[test]
+    fn the_frame_map_is_that_of_a_robot_unless_it_is_the_parent_of_two() {
+        let mut merged = MergedMaps::default();
+        merged.add_transforms(&edges(&[("map", "a/map"), ("map", "b/map")]));
+        assert_eq!(origins(&mut merged, &[("a", "map"), ("b", "map"), ("x", "map")]), [Robot, Robot, Robot]);
+        let posed = roles(&["a", "b", "x"], &["a", "b"]);
+        assert_eq!(merged.origin("x", "map", &posed), Merged);
+        assert_eq!(MergedMaps::default().origin("x", "map", &posed), Doubtful);
+    }
+
+    #[test]
+    fn a_map_in_the_map_frame_of_another_robot_is_a_merged_one() {
+        assert_eq!(origins(&mut MergedMaps::default(), &[("x", "x/a/map"), ("a", "a/map")]), [Merged, Robot]);
+        let two = roles(&["a", "x"], &[]);
+        assert_eq!(MergedMaps::default().origin("x", "a/map", &two), Robot, "of one part nothing is merged");
+    }
+
+    #[test]
+    fn a_program_that_merges_maps_is_known_by_its_name() {
+        let merging = roles(&["a", "b", "MapMerger"], &[]);
+        assert_eq!(MergedMaps::default().origin("MapMerger", "map", &merging), Merged);
+        let files = roles(&["merged1", "merged2", "merged3"], &[]);
+        assert_eq!(MergedMaps::default().origin("merged1", "map", &files), Robot);
+    }
+
+    #[test]
+    fn what_has_more_than_maps_or_is_named_by_the_user_is_a_robot() {
+        let world = [("a", "a/map"), ("b", "b/map"), ("x", "world")];
+        let mut named = MergedMaps::new(["x".to_owned()].into());
+        assert_eq!(origins(&mut named, &world), [Robot, Robot, Robot]);
+        let mut seen = MergedMaps::default();
+        seen.add_transforms(&edges(&[("world", "x/base_link")]));
+        assert_eq!(origins(&mut seen, &world), [Robot, Robot, Robot]);
+        let flown = roles(&["a", "b", "x"], &["x"]);
+        let mut posed = MergedMaps::default();
+        assert!(world.iter().all(|(robot, frame)| posed.origin(robot, frame, &flown) == Robot));
     }
 }

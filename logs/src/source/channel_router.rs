@@ -1,18 +1,48 @@
 //! Routes messages to the output ports of their channels.
 
+mod missing;
+
 use super::channel::{Route, Stamp};
 use super::derived::Derived;
 use super::latched::Latch;
 use super::{RobotMessages, RobotReading};
-use crate::names::{rename_advice, scan_rename_advice};
 use crate::one_map::OneMap;
-use crate::robots::{CellValues, MapOrigin, MergedMaps, RobotChannels, Role, is_scan, tilt_of};
-use crate::schemas::full_type_name;
+use crate::robots::{
+    CellValues, MapOrigin, MergedMaps, RobotChannels, Role, TagRanges, doubtful, inversion_of, left_out, tilt_of,
+    unit_of_map,
+};
 use crate::tf::{MAP_FRAMES, is_static, tf_topic};
 use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
-use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, TFMessage, decode};
+use gridweave_runtime::ros::{Header, OccupancyGrid, TFMessage, TagRange, decode};
 use gridweave_runtime::stage::{Output, RobotTopics, StageError, frame_of_robot};
 use std::collections::{BTreeMap, BTreeSet};
+
+/// The number of maps on a topic in which two values are looked for that are exchanged.
+const FIRST_MAPS: u64 = 10;
+
+/// What is warned of in the maps on a topic, once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Peculiarity {
+    Merged,
+    Doubtful,
+    Tilted,
+    OtherUnit,
+    Inverted,
+}
+
+/// What is unusual in a map, whose values are read by `values` and before which `earlier` came on its topic.
+fn peculiarities(map: &[u8], values: CellValues, earlier: u64) -> impl Iterator<Item = (Peculiarity, String)> {
+    let grid = decode::<OccupancyGrid<'_>>(map).ok();
+    let may_be_inverted = values == CellValues::Auto && earlier < FIRST_MAPS;
+    let inversion = grid.as_ref().filter(|_| may_be_inverted).and_then(|grid| inversion_of(grid.cells()));
+    let unit = grid.and_then(|grid| unit_of_map(&grid.info));
+    let found =
+        [(Peculiarity::Tilted, tilt_of(map)), (Peculiarity::OtherUnit, unit), (Peculiarity::Inverted, inversion)];
+    found.into_iter().filter_map(|(peculiarity, text)| Some((peculiarity, text?)))
+}
+
+/// The number of messages on a topic of transforms in which frames are looked for: later ones repeat them.
+const FIRST_TRANSFORMS: u64 = 1000;
 
 /// Routes messages to the output ports of their channels, and sends what is derived from them.
 pub(super) struct ChannelRouter {
@@ -25,8 +55,10 @@ pub(super) struct ChannelRouter {
     /// The last map of each route whose origin is undecided: none live, where other maps may never be published.
     undecided: Vec<(usize, Stamp, Vec<u8>)>,
     holds_undecided: bool,
-    /// Topics of maps whose tilt was warned of.
-    tilted: BTreeSet<String>,
+    /// Topics of maps, and what was warned of in them.
+    noted: BTreeSet<(String, Peculiarity)>,
+    /// By topic.
+    tag_ranges: BTreeMap<String, TagRanges>,
     routes: Vec<Route>,
     by_channel: BTreeMap<Channel, usize>,
     derived: Derived,
@@ -54,7 +86,8 @@ impl ChannelRouter {
             merged_maps: updates_maps.then(MergedMaps::default),
             undecided: Vec::new(),
             holds_undecided: true,
-            tilted: BTreeSet::new(),
+            noted: BTreeSet::new(),
+            tag_ranges: BTreeMap::new(),
             routes: Vec::new(),
             by_channel: BTreeMap::new(),
             map_frames: BTreeSet::new(),
@@ -139,13 +172,27 @@ impl ChannelRouter {
         self.derived.needs_frames()
     }
 
+    /// The robots that the user has named: whatever their maps are, they are theirs.
+    pub(super) fn set_given_robots(&mut self, given: &BTreeSet<String>) {
+        self.merged_maps = self.merged_maps.is_some().then(|| MergedMaps::new(given.clone()));
+    }
+
+    /// Whether a map may be a merged one of others.
+    pub(super) fn seeks_merged_maps(&self) -> bool {
+        self.merged_maps.is_some() && self.roles.mapped().count() > MergedMaps::LEAST_PARTS
+    }
+
     /// Learns transforms of the log before they come; their frame names lack `prefix`.
     pub(super) fn learn_transforms(&mut self, prefix: &str, is_static: bool, transforms: &TFMessage) {
-        self.derived.learn_ahead(prefix, is_static, transforms);
+        self.merged_maps.iter_mut().for_each(|merged_maps| merged_maps.add_transforms(transforms));
+        if self.derived.needs_frames() {
+            self.derived.learn_ahead(prefix, is_static, transforms);
+        }
     }
 
     /// Learns the frame of a robot's map before it comes.
     pub(super) fn learn_map_frame(&mut self, robot: &str, frame: &str) {
+        self.merged_maps.iter_mut().for_each(|merged_maps| merged_maps.add_map(robot, frame));
         self.derived.set_map_frame(robot, frame);
         if !frame.is_empty() {
             self.map_frames.insert(frame_of_robot(robot, frame).into_owned());
@@ -192,7 +239,7 @@ impl ChannelRouter {
         let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
         if let Some(merged_maps) = &mut self.merged_maps
             && tf_topic(&route.channel).is_some()
-            && is_static(&route.channel.topic)
+            && (is_static(&route.channel.topic) || route.messages < FIRST_TRANSFORMS)
             && let Ok(transforms) = decode::<TFMessage>(data)
         {
             merged_maps.add_transforms(&transforms);
@@ -202,7 +249,14 @@ impl ChannelRouter {
                 self.pass_map(index, stamp, data, self.holds_undecided, output)?;
                 self.pass_undecided(true, output)
             }
-            Role::Tags => route.send(stamp, data, &output.tags, output.log_time()),
+            Role::Tags => {
+                if let Ok(TagRange { range, .. }) = decode(data)
+                    && let Some(note) = self.tag_ranges.entry(route.channel.topic.clone()).or_default().add(range)
+                {
+                    output.warn(format!("tags on `{}`: {note}", route.channel.topic));
+                }
+                route.send(stamp, data, &output.tags, output.log_time())
+            }
             Role::Topology => route.send(stamp, data, &output.topology, output.log_time()),
             Role::MapUpdate
             | Role::Pose(_)
@@ -227,7 +281,7 @@ impl ChannelRouter {
         // One that cannot be read shows nothing of the others.
         let header = decode::<Header>(data).ok();
         let merged_maps = self.merged_maps.as_mut().zip(header);
-        let origin = merged_maps.map(|(maps, header)| maps.origin(&route.robot, &header.frame_id, self.roles.mapped()));
+        let origin = merged_maps.map(|(maps, header)| maps.origin(&route.robot, &header.frame_id, &self.roles));
         match origin {
             Some(MapOrigin::Undecided) if may_hold => {
                 self.undecided.retain(|(held, ..)| *held != index);
@@ -235,17 +289,24 @@ impl ChannelRouter {
                 Ok(())
             }
             Some(MapOrigin::Merged) => {
-                output.warn(format!(
-                    "maps on `{topic}` are merged ones of another program, and are not taken as a robot's"
-                ));
+                // Live there is no such option.
+                let option = self.holds_undecided.then(|| self.roles.robots_option(None));
+                if self.noted.insert((topic.clone(), Peculiarity::Merged)) {
+                    output.warn(left_out(topic, option.as_deref()));
+                }
                 route.send(stamp, data, &output.other, log_time)
             }
             _ => {
-                if !self.tilted.contains(topic)
-                    && let Some(tilt) = tilt_of(data)
+                if origin == Some(MapOrigin::Doubtful)
+                    && self.holds_undecided
+                    && self.noted.insert((topic.clone(), Peculiarity::Doubtful))
                 {
-                    output.warn(format!("maps on `{topic}`: {tilt}"));
-                    self.tilted.insert(topic.clone());
+                    output.warn(doubtful(topic, &route.robot, &self.roles.robots_option(Some(&route.robot))));
+                }
+                for (peculiarity, found) in peculiarities(data, self.map_values, route.messages) {
+                    if self.noted.insert((topic.clone(), peculiarity)) {
+                        output.warn(format!("maps on `{topic}`: {found}"));
+                    }
                 }
                 match self.map_values.translate(data) {
                     Some((translated, notes)) => {
@@ -307,67 +368,5 @@ impl ChannelRouter {
         });
         self.by_channel.insert(channel, index);
         Some(index)
-    }
-
-    /// The topics of occupancy grids that have been seen.
-    fn grid_topics(&self) -> impl Iterator<Item = &str> {
-        self.topics_of(|type_name| type_name == OccupancyGrid::NAME)
-    }
-
-    fn topics_of(&self, is_meant: fn(&str) -> bool) -> impl Iterator<Item = &str> {
-        let is_meant = move |route: &&Route| is_meant(&full_type_name(&route.channel.schema_name));
-        self.routes.iter().filter(is_meant).map(|route| route.channel.topic.as_str())
-    }
-
-    /// Warns of ports that are read and for which no message came.
-    pub(super) fn warn_of_missing(&self, output: &Output<RobotMessages>) {
-        let routed = |role: fn(Role) -> bool| {
-            self.routes.iter().any(|route| role(route.role) && route.messages > route.unreadable)
-        };
-        let builds_maps = output.scans.is_read() && routed(|role| role == Role::Scan);
-        if output.map.is_read() && !builds_maps && !self.has_one_map && !routed(|role| role == Role::Map) {
-            let others = match self.grid_topics().collect::<Vec<_>>().join(", ") {
-                topics if topics.is_empty() => topics,
-                topics => format!(" (there are maps on {topics})"),
-            };
-            output.warn(format!("no map was found: no topic fits `{}`{others}", self.robots.map));
-        }
-        let advice = rename_advice(self.grid_topics(), &self.robots.map);
-        if output.map.is_read() && !builds_maps && !advice.is_empty() {
-            output.warn(format!(
-                "maps on topics that do not fit `{}` are not used: give {}",
-                self.robots.map,
-                advice.join(" ")
-            ));
-        }
-        if output.map.is_read()
-            && !routed(|role| role == Role::Map)
-            // Scans that cannot be read have a warning of their own.
-            && !self.routes.iter().any(|route| route.role == Role::Scan)
-            && let Some(advice) = scan_rename_advice(self.topics_of(is_scan), &self.robots.scan)
-        {
-            let pattern = &self.robots.scan;
-            output.warn(format!("scans on topics that do not fit `{pattern}` are not used: give {advice}"));
-        }
-        if output.pose.is_read()
-            && !self.has_one_map
-            && !routed(|role| matches!(role, Role::Pose(_)))
-            && !self.derived.has_inferred_poses()
-            && !self.derived.has_odometry()
-        {
-            match &self.robots.tf {
-                Some(frames) => output.warn(format!(
-                    "no pose was found: tf never connects `{}` to `{}`",
-                    frames.base_frame, frames.map_frame
-                )),
-                None => output.warn(format!("no pose was found: no topic fits `{}`", self.robots.pose)),
-            }
-        }
-        if output.tags.is_read() && !routed(|role| role == Role::Tags) && !self.derived.has_made_readings() {
-            output.warn(format!("no reading of a tag was found: no topic fits `{}`", self.robots.tags));
-        }
-        if output.pose.is_read() && !self.derived.has_odometry() {
-            self.derived.warn_of_missing_poses(output);
-        }
     }
 }

@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// Teaches `router` the static transforms of the files, the first transforms of others, and the frames of the first
 /// maps.
 pub(super) fn learn_ahead(files: &Arc<[LogFile]>, names: &Names, router: &mut ChannelRouter) {
-    let needs_frames = router.needs_frames();
+    let needs_frames = router.needs_frames() || router.seeks_merged_maps();
     // Whoever writes transforms needs the frames of the maps.
     if !needs_frames && names.channels().all(|channel| tf_topic(channel).is_none()) {
         return;

@@ -50,6 +50,7 @@ impl Router {
     ) -> Self {
         let one_map = updates_maps.then(|| OneMap::read(&files, &names, &robots)).flatten();
         let mut channels = ChannelRouter::new(robots, names.channels(), updates_maps, reading);
+        channels.set_given_robots(names.given_robots());
         if updates_maps {
             learn_ahead(&files, &names, &mut channels);
         }

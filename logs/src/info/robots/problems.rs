@@ -35,15 +35,12 @@ impl RobotSurvey {
         self.mismatches.iter().cloned().chain(unreadable)
     }
 
-    /// Maps that cannot be used, and merged maps of other programs.
+    /// Maps that cannot be used, merged maps of other programs, and lidars that are not read.
     fn unusable_maps(&self) -> impl Iterator<Item = String> {
         let unusable = self.unusable_maps.iter();
         let unusable =
             unusable.map(|(robot, (error, count))| format!("{count} of the maps of {robot} cannot be used: {error}"));
-        let merged = self.merged_topics.iter();
-        let merged =
-            merged.map(|topic| format!("maps on `{topic}` are merged ones of another program, and are not used"));
-        unusable.chain(merged)
+        unusable.chain(self.notes.iter().cloned())
     }
 
     /// The map in which several robots localise.

@@ -79,7 +79,7 @@ fn maps_that_are_all_in_the_world_are_those_of_robots() {
         }
     };
     let robots: Vec<String> = read(&log, "").on("map").iter().map(|message| message.robot().to_owned()).collect();
-    assert_eq!(robots, ["b", "a", "c", "a"], "the first is held until it is certain");
+    assert_eq!(robots, ["a", "b", "c", "a"], "the frames of all are known before the first");
     let alone = |log: &mut TestLog| {
         log.add("/a/map", OccupancyGrid::NAME, 1, &map("world", &[0, 100, 0]));
         for robot in ["b", "c"] {
@@ -87,6 +87,109 @@ fn maps_that_are_all_in_the_world_are_those_of_robots() {
         }
     };
     assert_eq!(read(&alone, "").on("map").len(), 3, "what stays undecided is sent at the end");
+}
+
+fn robots_of(run: &Run) -> BTreeSet<String> {
+    run.on("map").iter().map(|message| message.robot().to_owned()).collect()
+}
+
+/// Maps and poses of two robots, and a map of another program in `frame`.
+fn merged_beside_two(log: &mut TestLog, topic: &str, frame: &str) {
+    log.add(topic, OccupancyGrid::NAME, 1, &map(frame, &[0, 0, 100, 0]));
+    for robot in ["robot1", "robot2"] {
+        let frame = format!("{robot}/map");
+        log.add(&format!("/{robot}/map"), OccupancyGrid::NAME, 2, &map(&frame, &[0, 0, 100, 0]));
+        log.add(&format!("/{robot}/pose"), PoseStamped::NAME, 3, &PoseStamped { pose: at(1.0), ..Default::default() });
+    }
+}
+
+#[test]
+fn a_merged_map_is_left_out_whatever_its_frame_is_and_taken_in_by_the_option() {
+    let two = BTreeSet::from(["robot1".to_owned(), "robot2".to_owned()]);
+    let join = |log: &mut TestLog, topics: [&str; 2], child: [&str; 2]| {
+        for (topic, child) in topics.into_iter().zip(child) {
+            let edge = TransformStamped {
+                header: Header::new(LogTime(1), "common"),
+                child_frame_id: child.into(),
+                ..Default::default()
+            };
+            log.add(topic, TFMessage::NAME, 4, &TFMessage { transforms: vec![edge] });
+        }
+    };
+    let shapes: [(&str, &dyn Fn(&mut TestLog)); 4] = [
+        ("/base/map", &|log| merged_beside_two(log, "/base/map", "robot1/map")),
+        ("/map_merge/map", &|log| merged_beside_two(log, "/map_merge/map", "map")),
+        ("/base/map", &|log| {
+            merged_beside_two(log, "/base/map", "common");
+            join(log, ["/robot1/tf", "/robot2/tf"], ["map", "map"]);
+        }),
+        ("/base/map", &|log| {
+            merged_beside_two(log, "/base/map", "common");
+            join(log, ["/tf", "/tf"], ["robot1/map", "robot2/map"]);
+        }),
+    ];
+    for (number, (topic, log)) in shapes.iter().enumerate() {
+        let run = read(log, "");
+        assert_eq!(robots_of(&run), two, "{number}: {:?}", run.warnings);
+        let program = topic.split('/').nth(1).unwrap();
+        let mut robots = ["robot1", "robot2", program];
+        robots.sort_unstable();
+        let warning = format!(
+            "maps on `{topic}` are merged ones of another program, and are not taken as a robot's; if they are a robot's, give \
+             --robots {}",
+            robots.join(",")
+        );
+        assert_eq!(run.warnings.get(&warning), Some(&1), "{number}: {:?}", run.warnings);
+        let all = read(log, &format!("only_robots = {robots:?}"));
+        assert_eq!(robots_of(&all).len(), 3, "{number}");
+        assert!(!all.warnings.keys().any(|warning| warning.contains("merged")), "{number}: {:?}", all.warnings);
+    }
+}
+
+#[test]
+fn a_robot_whose_map_is_in_the_world_is_told_from_a_program_by_what_else_it_has() {
+    let log = |log: &mut TestLog| {
+        merged_beside_two(log, "/drone/map", "world");
+        log.raw("/drone/imu", "sensor_msgs/msg/Imu", 1, b"");
+    };
+    let run = read(&log, "");
+    assert_eq!(robots_of(&run).len(), 3, "{:?}", run.warnings);
+    assert!(!run.warnings.keys().any(|warning| warning.contains("merged")), "{:?}", run.warnings);
+    let nothing_else = read(&|log| merged_beside_two(log, "/base/map", "map"), "");
+    assert_eq!(robots_of(&nothing_else).len(), 3);
+    let warning = "of base there is nothing but maps: if those on `/base/map` are merged ones of another program, give \
+                   --robots robot1,robot2";
+    assert_eq!(nothing_else.warnings.get(warning), Some(&1), "{:?}", nothing_else.warnings);
+}
+
+#[test]
+fn a_map_in_centimetres_one_with_exchanged_values_and_ranges_in_millimetres_are_named_once() {
+    let large = MapMetaData { width: 400, height: 300, resolution: 5.0, ..Default::default() };
+    let cells: Vec<u8> = (0..120_000).map(|index| u8::from(index % 50 > 0)).collect();
+    let log = |log: &mut TestLog| {
+        for second in 1..20 {
+            let map = OccupancyGrid { header: Header::new(LogTime(1), "map"), info: large, data: &cells };
+            log.add("/a/map", OccupancyGrid::NAME, second, &map);
+            log.add("/a/tag_ranges", TagRange::NAME, second, &TagRange { range: 5230.0, ..reading() });
+        }
+    };
+    let run = read(&log, "");
+    for start in [
+        "maps on `/a/map`: cells of 5 m make a map of 2000 m by 1500 m",
+        "maps on `/a/map`: 117600 cells have the value 1 and 2400 the value 0",
+        "tags on `/a/tag_ranges`: ranges of 5230 m are too long",
+    ] {
+        let counts: Vec<u64> =
+            run.warnings.iter().filter(|(text, _)| text.starts_with(start)).map(|(_, count)| *count).collect();
+        assert_eq!(counts, [1], "{start}: {:?}", run.warnings);
+    }
+    let inverted = read(&log, "map_values = \"inverted\"");
+    assert!(cells_of(&inverted, 100) == 2400 && cells_of(&inverted, 0) == 117_600, "{:?}", inverted.warnings);
+}
+
+/// The number of cells with a value in the first map.
+fn cells_of(run: &Run, value: u8) -> usize {
+    cells(run)[0].iter().filter(|cell| **cell == value).count()
 }
 
 #[test]
