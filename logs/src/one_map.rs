@@ -21,7 +21,8 @@ const SEARCHED: usize = 2_000;
 /// The fewest robots that share a map.
 const LEAST_ROBOTS: usize = 2;
 /// The last part of the names of frames by which a localizer connects a robot to the map.
-const ROBOT_FRAMES: [&str; 3] = ["odom", "base_link", "base_footprint"];
+const ROBOT_FRAMES: [&str; 3] = [ODOM, "base_link", "base_footprint"];
+const ODOM: &str = "odom";
 
 /// A map that is no robot's, and the robots that localise in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -80,26 +81,32 @@ impl OneMap {
         });
         let (mut frame, mut read) = (None, 0);
         let mut posed: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+        let mut certain = BTreeSet::new();
         while read < SEARCHED
             && let Some(message) = reader.next_message()
         {
             match shown.get(&(message.file, message.channel)) {
                 Some(Shown::Map) => frame = frame.or_else(|| frame_of(message.data)),
                 Some(Shown::Pose(robot)) => {
+                    certain.insert(robot.clone());
                     posed.entry(robot.clone()).or_default().extend(frame_of(message.data));
                 }
                 Some(Shown::Transforms(robot)) => {
                     read += 1;
                     let transforms = decode::<TFMessage>(message.data).map(|message| message.transforms);
                     for edge in transforms.unwrap_or_default() {
-                        if let Some(robot) = robot_of_frame(robot, plain(&edge.child_frame_id), names) {
-                            posed.entry(robot).or_default().insert(plain(&edge.header.frame_id).to_owned());
+                        let child = plain(&edge.child_frame_id);
+                        let Some((robot, is_certain)) = robot_of_frame(robot, child, names) else { continue };
+                        if is_certain || !child.ends_with(ODOM) {
+                            certain.insert(robot.clone());
                         }
+                        posed.entry(robot).or_default().insert(plain(&edge.header.frame_id).to_owned());
                     }
                 }
                 _ => {}
             }
         }
+        posed.retain(|robot, _| certain.contains(robot));
         Self::of(topic, frame?, &posed, &roles, names)
     }
 
@@ -165,14 +172,15 @@ fn plain(frame: &str) -> &str {
     frame.trim_start_matches('/')
 }
 
-/// The robot of a frame by which a localizer connects it to a map: `robot1/odom`, or `odom` on the transforms of
-/// `robot1`; or `robot1_odom` of a robot that has a topic, since there may be several kinds of odometry.
-fn robot_of_frame(robot: &str, frame: &str, names: &Names) -> Option<String> {
+/// The robot of a frame by which a localizer connects it to a map, and whether it is certain: `robot1/odom`, or `odom` on
+/// the transforms of `robot1`; or `robot1_odom` of a robot that has a topic. Of a robot without one there must be a
+/// `robot1_base_link`, too, since there may be several kinds of odometry.
+fn robot_of_frame(robot: &str, frame: &str, names: &Names) -> Option<(String, bool)> {
     let (named, last) = frame.rsplit_once('/').unwrap_or((robot, frame));
     if ROBOT_FRAMES.contains(&last) {
-        return Some(named.to_owned()).filter(|named| !named.is_empty());
+        return Some((named.to_owned(), true)).filter(|(named, _)| !named.is_empty());
     }
     let named = ROBOT_FRAMES.iter().find_map(|name| frame.strip_suffix(name)?.strip_suffix('_'))?;
     let under = format!("/{named}/");
-    names.channels().any(|channel| channel.topic.starts_with(&under)).then(|| named.to_owned())
+    Some((named.to_owned(), names.channels().any(|channel| channel.topic.starts_with(&under))))
 }

@@ -31,8 +31,9 @@ fn localised(log: &mut LogBuilder) {
     }
 }
 
-/// The same in tf. Each robot's frames have its name before them, or else its transforms are on a topic of its own.
-fn localised_in_tf(log: &mut LogBuilder, has_names: bool) {
+/// The same in tf. Each robot's frames have its name and `separator` before them, or else its transforms are on a topic of
+/// its own.
+fn localised_in_tf(log: &mut LogBuilder, separator: Option<char>) {
     for second in 0..20 {
         for robot in ["robot1", "robot2"] {
             let at = f64::from(second);
@@ -41,8 +42,10 @@ fn localised_in_tf(log: &mut LogBuilder, has_names: bool) {
                 child_frame_id: child.into(),
                 transform: Transform::default(),
             };
-            let (topic, prefix) =
-                if has_names { ("/tf".into(), format!("{robot}/")) } else { (format!("/{robot}/tf"), String::new()) };
+            let (topic, prefix) = match separator {
+                Some(separator) => ("/tf".into(), format!("{robot}{separator}")),
+                None => (format!("/{robot}/tf"), String::new()),
+            };
             let [odom, base] = ["odom", "base_link"].map(|frame| format!("{prefix}{frame}"));
             log.message(at, &topic, &TFMessage { transforms: vec![edge(&odom, &base), edge("map", &odom)] });
         }
@@ -66,12 +69,19 @@ fn assert_says_nothing_of_tags(ended: &Ended) {
 #[test]
 fn of_robots_that_localise_in_one_map_it_is_said_that_nothing_is_to_be_merged() {
     let folder = TempDir::new().unwrap();
-    let ways: [&dyn Fn(&mut LogBuilder); 3] =
-        [&localised, &|log| localised_in_tf(log, true), &|log| localised_in_tf(log, false)];
-    for way in ways {
+    let ways: [(bool, &dyn Fn(&mut LogBuilder)); 4] = [
+        (true, &localised),
+        (true, &|log| localised_in_tf(log, Some('/'))),
+        (true, &|log| localised_in_tf(log, None)),
+        // Nothing but the frames in tf names the robots.
+        (false, &|log| localised_in_tf(log, Some('_'))),
+    ];
+    for (has_topics, way) in ways {
         write(&folder, |log| {
             grid(log, "/map");
-            grid(log, "/robot1/global_costmap/costmap");
+            if has_topics {
+                grid(log, "/robot1/global_costmap/costmap");
+            }
             way(log);
         });
         let ended = merge(&folder);
