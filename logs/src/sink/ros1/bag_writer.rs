@@ -1,7 +1,7 @@
 //! Writing of a bag: chunks with their indexes, and at the end all connections and the times of all chunks.
 
 use super::definition::Ros1Type;
-use super::record::{HeaderBytes, push_record, time_bytes};
+use super::record::{HeaderBytes, LAST_TIME, push_record, time_bytes};
 use crate::dynamic::{Ros1Encoder, Schema};
 use crate::file::OutputFile;
 use crate::qos::is_transient_local;
@@ -140,6 +140,11 @@ impl BagWriter {
         let Some(connection) = self.connections.get_mut(usize::from(header.channel_id)) else {
             return Ok(Err("its channel is not known".to_owned()));
         };
+        if header.log_time > LAST_TIME {
+            return Ok(Err(
+                "its time is after the year 2106, where the times of ROS 1 end; an MCAP log holds it".to_owned()
+            ));
+        }
         let mut message = Vec::new();
         if let Err(error) = connection.encoder.append(bytes, connection.messages, &mut message) {
             return Ok(Err(error.to_string()));

@@ -38,14 +38,13 @@ pub(super) fn push_record(bytes: &mut Vec<u8>, header: &HeaderBytes, data: &[u8]
     bytes.extend_from_slice(data);
 }
 
-/// The bytes of a time in nanoseconds: seconds, and nanoseconds of the second. Times after the year 2106 become the
-/// last one.
+const SECOND: u64 = 1_000_000_000;
+/// The last time of ROS 1, in the year 2106, nanoseconds.
+pub(super) const LAST_TIME: u64 = u32::MAX as u64 * SECOND + 999_999_999;
+
+/// The bytes of a time in nanoseconds, [`LAST_TIME`] at most: seconds, and nanoseconds of the second.
 pub(super) fn time_bytes(time: u64) -> [u8; 8] {
-    const SECOND: u64 = 1_000_000_000;
-    let (seconds, rest) = match u32::try_from(time / SECOND) {
-        Ok(seconds) => (seconds, (time % SECOND) as u32),
-        Err(_) => (u32::MAX, 999_999_999),
-    };
+    let (seconds, rest) = ((time.min(LAST_TIME) / SECOND) as u32, (time % SECOND) as u32);
     let mut bytes = [0; 8];
     bytes[..4].copy_from_slice(&seconds.to_le_bytes());
     bytes[4..].copy_from_slice(&rest.to_le_bytes());

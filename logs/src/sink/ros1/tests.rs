@@ -104,8 +104,12 @@ fn messages_that_a_bag_cannot_hold_are_named() {
     let why = bag.write(&header(pose_id, 1), b"\0\x01\0\0short").unwrap().unwrap_err();
     assert!(why.contains("does not match"), "{why}");
     bag.write(&header(pose_id, 2), &pose(1)).unwrap().unwrap();
+    let last = u64::from(u32::MAX) * 1_000_000_000 + 999_999_999;
+    bag.write(&header(pose_id, last), &pose(1)).unwrap().unwrap();
+    let why = bag.write(&header(pose_id, last + 1), &pose(1)).unwrap().unwrap_err();
+    assert!(why.contains("after the year 2106") && why.contains("MCAP"), "{why}");
     let path = bag.finish(Outcome::Complete).unwrap();
-    assert_eq!(read_file(&path).unwrap().0.len(), 1);
+    assert_eq!(read_file(&path).unwrap().0.len(), 2);
 }
 
 #[test]
