@@ -41,6 +41,13 @@ fn a_cut_log_is_recovered_and_the_loss_is_reported() {
     info.assert(0, &["bag_0.mcap"]);
     assert!(!info.stdout.contains("has no end"), "{info:#?}");
 
+    // What a killed run leaves has the name that its log would be written as.
+    fs::write(path("run.mcap.part"), &bytes[..bytes.len() / 2]).unwrap();
+    fs::write(path("run_2.mcap"), "another").unwrap();
+    run(&["run.mcap.part", "-o", "run.mcap"])
+        .assert(2, &["until it is whole", "choose another output, such as run_3.mcap"]);
+    run(&["run.mcap.part", "-o", "run_3.mcap"]).assert(0, &["to run_3.mcap"]);
+
     run(&["in.mcap", "-o", "in.mcap"]).assert(2, &["is an input"]);
     run(&["none.mcap", "-o", "x.mcap"]).assert(1, &["none.mcap"]);
     fs::write(path("text.mcap"), "no log").unwrap();

@@ -83,8 +83,12 @@ fn is_part(file: &Path, output: &Path) -> bool {
 }
 
 fn is_the_part(file: &Path, output: &Path) -> anyhow::Error {
-    let (file, output) = (file.display(), output.display());
-    BadUse(format!("{output} is written as {file} until it is whole: choose another name for one of them")).into()
+    let ending = output.extension().map_or_else(String::new, |ending| format!(".{}", ending.display()));
+    let stem = output.file_stem().unwrap_or_default().display();
+    let numbered = (2..).map(|number| output.with_file_name(format!("{stem}_{number}{ending}")));
+    let free = numbered.take(1000).find(|path| !path.exists()).unwrap_or_default();
+    let (file, output, free) = (file.display(), output.display(), free.display());
+    BadUse(format!("{output} is written as {file} until it is whole: choose another output, such as {free}")).into()
 }
 
 fn is_an_input(output: &Path) -> anyhow::Error {
