@@ -131,3 +131,33 @@ fn a_map_beside_robots_with_maps_of_their_own_is_no_map_in_which_they_localise()
     let ended = merge(&folder);
     ended.assert(3, &["robot1 and robot2 have sent no map", "it has sent no map"]);
 }
+
+#[test]
+fn a_merged_map_of_another_program_is_left_out_and_the_map_of_a_drone_in_the_world_is_kept() {
+    let folder = TempDir::new().unwrap();
+    let map = TestMap::flat();
+    let cells: Vec<u8> = map.cells.iter().map(|cell| *cell as u8).collect();
+    let write = |other: &str, frame: &str, is_posed: bool| {
+        write(&folder, |log| {
+            for robot in ["robot1", "robot2"] {
+                log.map(0.0, robot, &map).pose(1.0, robot, 1.0, 2.0).pose(2.0, robot, 2.0, 2.0);
+            }
+            let grid = OccupancyGrid { header: header(1.5, frame), info: map.info, data: &cells };
+            log.message(1.5, &format!("/{other}/map"), &grid);
+            if is_posed {
+                log.pose(2.0, other, 1.0, 2.0);
+            }
+        });
+    };
+    let left_out = "maps on `/base/map` are merged ones of another program, and are not taken as a robot's; if they are a \
+                    robot's, give --robots base,robot1,robot2";
+    write("base", "robot1/map", false);
+    merge(&folder).assert(0, &["merged 2 of 2", left_out]);
+    gridweave(folder.path(), &["info", "in.mcap"]).assert(0, &[left_out]);
+    let with_base = ["merge", "in.mcap", "-o", "out.mcap", "--robots", "base,robot1,robot2"];
+    gridweave(folder.path(), &with_base).assert(0, &["merged 3 of 3"]);
+    write("drone", "world", true);
+    let ended = merge(&folder);
+    ended.assert(0, &["merged 3 of 3"]);
+    assert!(!ended.text().contains("merged ones"), "{ended:#?}");
+}
