@@ -5,7 +5,7 @@ mod problems;
 use crate::one_map::OneMap;
 use crate::robots::{
     Classified, InferredPoses, MapOrigin, MergedMaps, PoseSource, RobotChannels, Role, TagReader, doubtful, is_scan,
-    left_out, pose_with_covariance,
+    left_out, pose_with_covariance, unread_map,
 };
 use crate::schemas::full_type_name;
 use crate::tf::{TfPoses, is_static};
@@ -59,6 +59,8 @@ pub(super) struct RobotSurvey {
     other_maps: BTreeSet<String>,
     /// Topics with scans that belong to no robot.
     other_scans: BTreeSet<String>,
+    /// What is said of maps of types that are not read.
+    unread_maps: BTreeSet<String>,
     /// By robot: what is wrong with the first map that cannot be used, and how many such maps there are.
     unusable_maps: BTreeMap<String, (GridError, u64)>,
     merged_maps: MergedMaps,
@@ -93,6 +95,7 @@ impl RobotSurvey {
             mismatches: BTreeSet::new(),
             other_maps: BTreeSet::new(),
             other_scans: BTreeSet::new(),
+            unread_maps: BTreeSet::new(),
             unusable_maps: BTreeMap::new(),
             merged_maps: MergedMaps::default(),
             map_frames: BTreeMap::new(),
@@ -117,6 +120,7 @@ impl RobotSurvey {
     pub(super) fn classify(&mut self, channel: &Channel) -> (Role, String) {
         let Classified { role, robot, mismatch } = self.roles.classify(channel);
         self.mismatches.extend(mismatch);
+        self.notes.extend(self.roles.lidar_note(channel).filter(|_| role == Role::Scan));
         if role == Role::TagMessage {
             let reader = self.roles.tag_reader(channel);
             self.tag_readers.extend(reader.map(|reader| (channel.topic.clone(), reader)));
@@ -128,7 +132,8 @@ impl RobotSurvey {
             Role::Other if is_scan(&full_type_name(&channel.schema_name)) => {
                 self.other_scans.insert(channel.topic.clone());
             }
-            Role::Other | Role::Tf => {}
+            Role::Other => self.unread_maps.extend(unread_map(&channel.topic, &channel.schema_name)),
+            Role::Tf => {}
             _ => {
                 self.robots.entry(robot.to_owned()).or_default().topics.insert(channel.topic.clone());
             }

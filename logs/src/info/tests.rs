@@ -98,6 +98,36 @@ fn maps_that_cannot_be_used_and_merged_maps_are_reported() {
 }
 
 #[test]
+fn maps_of_types_that_are_not_read_are_named_with_what_to_record() {
+    let mut log = TestLog::new(layouts()[0].clone());
+    log.raw("/robot1/octomap_binary", "octomap_msgs/msg/Octomap", 1, b"");
+    log.raw("/robot2/submap_list", "cartographer_ros_msgs/SubmapList", 2, b"");
+    let problems = inspect_bytes(&log.finish()).problems.join("\n");
+    for part in [
+        "`/robot1/octomap_binary` has octomap_msgs/msg/Octomap, which is not read as a map: record the grid that octomap_server",
+        "`/robot2/submap_list` has cartographer_ros_msgs/msg/SubmapList",
+    ] {
+        assert!(problems.contains(part), "{problems}");
+    }
+    let mut with_maps = two_robots();
+    with_maps.raw("/robot1/octomap_binary", "octomap_msgs/msg/Octomap", 6_000_000_000, b"");
+    assert_eq!(inspect_bytes(&with_maps.finish()).problems, [""; 0]);
+}
+
+#[test]
+fn scans_of_two_robots_on_one_topic_are_a_problem() {
+    use gridweave_runtime::ros::LaserScan;
+    let mut log = TestLog::new(layouts()[3].clone());
+    for (second, frame) in [(1, "robot1/laser"), (2, "robot2/laser")] {
+        let scan = LaserScan { header: Header::new(LogTime(1), frame), ..Default::default() };
+        log.add("/scan", LaserScan::NAME, second, &scan);
+    }
+    let problems = inspect_bytes(&log.finish()).problems;
+    let expected = "`/scan` has the messages of several robots, by their frames robot1/laser and robot2/laser";
+    assert!(problems.iter().any(|problem| problem.starts_with(expected)), "{problems:?}");
+}
+
+#[test]
 fn the_option_that_renames_topics_of_maps_is_advised() {
     let mut log = TestLog::new(layouts()[0].clone());
     log.add("/fleet/a/map", OccupancyGrid::NAME, 1, &map_in("a/map"));
@@ -216,10 +246,10 @@ fn a_sampled_log_with_an_index_has_the_same_contents_as_a_completely_read_one() 
 fn scans_on_topics_of_another_name_are_advised_to_be_renamed() {
     let mut log = TestLog::new(layouts()[3].clone());
     for robot in ["robot1", "robot2"] {
-        log.raw(&format!("/{robot}/front/scan"), "sensor_msgs/msg/LaserScan", 1, b"");
+        log.raw(&format!("/{robot}/sick/scan"), "sensor_msgs/msg/LaserScan", 1, b"");
     }
     let problems = inspect_bytes(&log.finish()).problems.join("\n");
-    assert!(problems.contains("give --rename '/{robot}/front/scan=/{robot}/scan'"), "{problems}");
+    assert!(problems.contains("give --rename '/{robot}/sick/scan=/{robot}/scan'"), "{problems}");
 }
 
 #[test]

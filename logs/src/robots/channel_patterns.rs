@@ -65,6 +65,11 @@ impl ChannelPatterns {
         self.scan_topics.robot(channel).filter(|robot| fits(robot))
     }
 
+    /// What is said of the other lidars of a robot whose scans a channel holds.
+    pub(super) fn lidar_note(&self, channel: &Channel) -> Option<String> {
+        self.scan_topics.note(self.scan(channel)?, &channel.topic)
+    }
+
     /// The robot in whose namespace a topic is, by the pattern of map topics.
     pub(super) fn namespace<'a>(&self, topic: &'a str) -> Option<&'a str> {
         let (namespace, _) = self.topics.map.split_once("{robot}")?;

@@ -101,14 +101,14 @@ impl RobotChannels {
         self.patterns.scan(channel)
     }
 
+    /// What is said of the other lidars of a robot of whose scans on a channel a map is built.
+    pub(crate) fn lidar_note(&self, channel: &Channel) -> Option<String> {
+        self.patterns.lidar_note(channel)
+    }
+
     /// Robots with maps, sorted by name.
     pub(crate) fn mapped(&self) -> impl Iterator<Item = &str> + Clone {
         self.robots(|data| data.has_maps)
-    }
-
-    /// Robots with scans and without maps, sorted by name.
-    pub(crate) fn scanned(&self) -> impl Iterator<Item = &str> {
-        self.robots(RobotData::is_scanned)
     }
 
     /// Whether a robot has anything but maps.
@@ -120,6 +120,11 @@ impl RobotChannels {
     pub(crate) fn robots_option(&self, but: Option<&str>) -> String {
         let robots: Vec<&str> = self.robots(RobotData::is_known).filter(|robot| Some(*robot) != but).collect();
         format!("--robots {}", robots.join(","))
+    }
+
+    /// Robots with scans and without maps, sorted by name.
+    pub(crate) fn scanned(&self) -> impl Iterator<Item = &str> {
+        self.robots(RobotData::is_scanned)
     }
 
     /// Whether a robot without a pose topic has an odometry topic.
@@ -219,16 +224,16 @@ fn data_of_robots(patterns: &ChannelPatterns, channels: &[&Channel]) -> BTreeMap
         {
             robots.entry(robot.to_owned()).or_default().has_tags_in_tf = true;
         }
-        let Some((role, robot)) = role_by_type(patterns, channel).filter(|(_, robot)| is_usable(robot)) else {
-            continue;
-        };
-        let data = robots.entry(robot.to_owned()).or_default();
-        data.has_maps |= role == Role::Map;
         if is_of_a_body(&full_type_name(&channel.schema_name))
             && let Some(robot) = patterns.namespace(topic)
         {
             robots.entry(robot.to_owned()).or_default().has_body = true;
         }
+        let Some((role, robot)) = role_by_type(patterns, channel).filter(|(_, robot)| is_usable(robot)) else {
+            continue;
+        };
+        let data = robots.entry(robot.to_owned()).or_default();
+        data.has_maps |= role == Role::Map;
         data.has_map_updates |= role == Role::MapUpdate;
         data.needs_poses |= matches!(role, Role::Map | Role::Tags | Role::TagMessage);
         data.has_poses |= matches!(role, Role::Pose(_));
@@ -238,11 +243,6 @@ fn data_of_robots(patterns: &ChannelPatterns, channels: &[&Channel]) -> BTreeMap
     robots
 }
 
-/// The role that a channel may have, whatever the other channels of its robot are, and the robot.
-fn role_by_type<'a>(patterns: &ChannelPatterns, channel: &'a Channel) -> Option<(Role, &'a str)> {
-    if let Some((robot, fields)) = patterns.tag_fields(channel, |_| false) {
-        return Some((tag_message(channel, robot, &fields).role, robot));
-    }
 /// Whether messages of a type are those of a robot's body. Point clouds are not: they may be maps.
 fn is_of_a_body(type_name: &str) -> bool {
     const TYPES: [&str; 6] = [
@@ -257,6 +257,11 @@ fn is_of_a_body(type_name: &str) -> bool {
     is_sensor || TYPES.contains(&type_name) || known_fields(type_name).is_some()
 }
 
+/// The role that a channel may have, whatever the other channels of its robot are, and the robot.
+fn role_by_type<'a>(patterns: &ChannelPatterns, channel: &'a Channel) -> Option<(Role, &'a str)> {
+    if let Some((robot, fields)) = patterns.tag_fields(channel, |_| false) {
+        return Some((tag_message(channel, robot, &fields).role, robot));
+    }
     let named = patterns.named(channel);
     if named.role != Role::Other {
         return Some((named.role, named.robot));

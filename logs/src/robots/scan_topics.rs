@@ -6,8 +6,29 @@ use crate::schemas::full_type_name;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{PointCloud2, RosMessage};
 use gridweave_runtime::stage::match_robot;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
+/// Topics of scans under a robot's name, as robots with several lidars and drivers publish them.
+const LIDAR_SCANS: [&str; 18] = [
+    "scan_front",
+    "front/scan",
+    "front_scan",
+    "front_laser/scan",
+    "front_lidar/scan",
+    "laser_front/scan",
+    "lidar_front/scan",
+    "base_scan",
+    "laser_scan",
+    "laser/scan",
+    "lidar/scan",
+    "scan_raw",
+    "scan_filtered",
+    "scan_rear",
+    "rear/scan",
+    "rear_scan",
+    "rear_laser/scan",
+    "rear_lidar/scan",
+];
 /// Topics of point clouds under a robot's name, as drivers of 3D lidars and simulators publish them. Clouds on others
 /// may be those of cameras, or of SLAM in its map.
 const LIDAR_CLOUDS: [&str; 12] = [
@@ -26,23 +47,51 @@ const LIDAR_CLOUDS: [&str; 12] = [
 ];
 
 /// The topics with the scans of robots: the one that the pipeline names, of scans or point clouds; for a robot that has
-/// none, the first of [`LIDAR_CLOUDS`].
-#[derive(Clone, Debug)]
+/// none, the first of [`LIDAR_SCANS`], or else of [`LIDAR_CLOUDS`].
+#[derive(Clone, Debug, Default)]
 pub(super) struct ScanTopics {
     /// The topic that the pipeline names, with `{robot}`.
     pattern: String,
-    clouds: DriverTopics,
+    /// Those that drivers use, of robots without the topic that the pipeline names.
+    drivers: [DriverTopics; 2],
+    /// By robot: the scans of its other lidars, which are not read.
+    unread: BTreeMap<String, Vec<String>>,
 }
 
 impl ScanTopics {
     /// Chooses the topics from the channels of logs.
     pub(super) fn new(pattern: &str, channels: &[&Channel]) -> Self {
-        let mut topics = Self { pattern: pattern.to_owned(), clouds: DriverTopics::default() };
-        let by_pattern: BTreeSet<&str> = channels.iter().filter_map(|channel| topics.robot(channel)).collect();
-        let clouds = channels.iter().filter(|channel| full_type_name(&channel.schema_name) == PointCloud2::NAME);
-        topics.clouds = DriverTopics::choose(&LIDAR_CLOUDS, clouds.map(|channel| channel.topic.as_str()));
-        topics.clouds.retain(|robot| !by_pattern.contains(robot) && !is_sensor(robot));
+        let mut topics = Self { pattern: pattern.to_owned(), ..Self::default() };
+        let (clouds, scans): (Vec<&Channel>, Vec<&Channel>) = channels
+            .iter()
+            .filter(|channel| is_scan(&full_type_name(&channel.schema_name)))
+            .partition(|channel| full_type_name(&channel.schema_name) == PointCloud2::NAME);
+        let kinds: [(&[&str], &[&Channel]); 2] = [(&LIDAR_SCANS, &scans), (&LIDAR_CLOUDS, &clouds)];
+        for (place, (names, of_kind)) in kinds.into_iter().enumerate() {
+            let known: BTreeSet<&str> = channels.iter().filter_map(|channel| topics.robot(channel)).collect();
+            let mut chosen = DriverTopics::choose(names, of_kind.iter().map(|channel| channel.topic.as_str()));
+            chosen.retain(|robot| !known.contains(robot) && !is_sensor(robot));
+            topics.drivers[place] = chosen;
+        }
+        let mut unread: BTreeMap<String, Vec<String>> = BTreeMap::new();
+        for channel in scans.iter().filter(|channel| topics.robot(channel).is_none()) {
+            let robot = channel.topic.split('/').nth(1).unwrap_or_default();
+            unread.entry(robot.to_owned()).or_default().push(channel.topic.clone());
+        }
+        topics.unread = unread;
         topics
+    }
+
+    /// What is said of a robot whose scans are on `topic` and that has other lidars, with the option that reads another.
+    pub(super) fn note(&self, robot: &str, topic: &str) -> Option<String> {
+        let is_chosen = self.drivers[0].robot(topic) == Some(robot);
+        let unread = self.unread.get(robot).filter(|_| is_chosen)?;
+        Some(format!(
+            "of the lidars of {robot}, the one on `{topic}` is read, and not those on {}: `--rename {}={}` reads another",
+            unread.join(", "),
+            unread.first()?,
+            self.pattern.replace("{robot}", robot)
+        ))
     }
 
     /// The robot whose scans a channel holds.
@@ -50,7 +99,8 @@ impl ScanTopics {
         if channel.message_encoding != "cdr" || !is_scan(&full_type_name(&channel.schema_name)) {
             return None;
         }
-        match_robot(&self.pattern, &channel.topic).or_else(|| self.clouds.robot(&channel.topic))
+        let by_driver = || self.drivers.iter().find_map(|topics| topics.robot(&channel.topic));
+        match_robot(&self.pattern, &channel.topic).or_else(by_driver)
     }
 }
 
@@ -101,6 +151,26 @@ mod tests {
 
     fn pair(robot: &str, topic: &str) -> (String, String) {
         (robot.to_owned(), topic.to_owned())
+    }
+
+    #[test]
+    fn one_lidar_of_a_robot_is_read_and_the_option_that_reads_another_is_named() {
+        let topics = [
+            ("/a/scan_rear", LaserScan::NAME),
+            ("/a/scan_front", LaserScan::NAME),
+            ("/a/points", PointCloud2::NAME),
+            ("/b/scan", LaserScan::NAME),
+            ("/b/rear/scan", LaserScan::NAME),
+            ("/c/base_scan", LaserScan::NAME),
+            ("/lidar/front/scan", LaserScan::NAME),
+        ];
+        assert_eq!(chosen(&topics), [pair("a", "/a/scan_front"), pair("b", "/b/scan"), pair("c", "/c/base_scan")]);
+        let channels: Vec<Channel> = topics.iter().map(|(topic, type_name)| channel(topic, type_name)).collect();
+        let of = ScanTopics::new("/{robot}/scan", &channels.iter().collect::<Vec<_>>());
+        let note = "of the lidars of a, the one on `/a/scan_front` is read, and not those on /a/scan_rear: \
+                    `--rename /a/scan_rear=/a/scan` reads another";
+        assert_eq!(of.note("a", "/a/scan_front").as_deref(), Some(note));
+        assert_eq!([of.note("b", "/b/scan"), of.note("c", "/c/base_scan")], [None, None]);
     }
 
     #[test]

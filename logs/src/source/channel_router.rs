@@ -8,8 +8,8 @@ use super::latched::Latch;
 use super::{RobotMessages, RobotReading};
 use crate::one_map::OneMap;
 use crate::robots::{
-    CellValues, MapOrigin, MergedMaps, RobotChannels, Role, TagRanges, doubtful, inversion_of, left_out, tilt_of,
-    unit_of_map,
+    CellValues, MapOrigin, MergedMaps, MixedFrames, RobotChannels, Role, TagRanges, doubtful, inversion_of, left_out,
+    tilt_of, unit_of_map,
 };
 use crate::tf::{MAP_FRAMES, is_static, tf_topic};
 use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
@@ -57,6 +57,8 @@ pub(super) struct ChannelRouter {
     holds_undecided: bool,
     /// Topics of maps, and what was warned of in them.
     noted: BTreeSet<(String, Peculiarity)>,
+    /// The frames of scans and odometry.
+    mixed_frames: MixedFrames,
     /// By topic.
     tag_ranges: BTreeMap<String, TagRanges>,
     routes: Vec<Route>,
@@ -87,6 +89,7 @@ impl ChannelRouter {
             undecided: Vec::new(),
             holds_undecided: true,
             noted: BTreeSet::new(),
+            mixed_frames: MixedFrames::default(),
             tag_ranges: BTreeMap::new(),
             routes: Vec::new(),
             by_channel: BTreeMap::new(),
@@ -137,6 +140,18 @@ impl ChannelRouter {
     ) -> Result<(), StageError> {
         self.pass(index, stamp, data, output)?;
         let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
+        if matches!(route.role, Role::Scan | Role::Odometry)
+            && self.merged_maps.is_some()
+            && let Ok(Header { frame_id, .. }) = decode(data)
+            && let Some(mixed) = self.mixed_frames.add(&route.channel.topic, &route.robot, &frame_id)
+        {
+            // A map of two robots is worse than none. Live, the others go on.
+            if self.holds_undecided {
+                return Err(StageError::new("tell robots apart", mixed));
+            }
+            output.warn(mixed);
+            return Ok(());
+        }
         self.derived.send(route, &self.roles, data, output)
     }
 
@@ -342,6 +357,11 @@ impl ChannelRouter {
         };
         if let Some(mismatch) = classified.mismatch {
             output.warn(mismatch);
+        }
+        if let Some(note) =
+            self.roles.lidar_note(&channel).filter(|_| classified.role == Role::Scan && output.scans.is_read())
+        {
+            output.warn(note);
         }
         // A message that is passed on unchanged needs no robot.
         let robot = FixedText::new(classified.robot).unwrap_or_default();

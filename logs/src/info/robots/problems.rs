@@ -1,8 +1,11 @@
 //! Problems with reading logs or merging the maps in them.
 
 use super::{RobotInfo, RobotSurvey};
-use crate::info::LogInfo;
+use crate::info::{LogInfo, TopicInfo};
 use crate::names::{rename_advice, scan_rename_advice};
+use crate::robots::{is_scan, problem_of_frames};
+use crate::schemas::full_type_name;
+use gridweave_runtime::ros::{Odometry, RosMessage};
 use std::collections::{BTreeMap, BTreeSet};
 
 impl RobotSurvey {
@@ -17,8 +20,10 @@ impl RobotSurvey {
         damage
             .chain(self.reading_problems())
             .chain(self.unusable_maps())
+            .chain(mixed_frames(info))
             .chain(self.shared_map())
             .chain(self.map_topic_problem(&map_advice))
+            .chain(self.unread_maps.iter().filter(|_| self.has_no_map()).cloned())
             .chain(self.scan_topic_problem())
             .chain(self.lone_robot().filter(|_| map_advice.is_empty()))
             .chain(self.missing_messages(&missing_poses))
@@ -160,6 +165,20 @@ fn damage(info: &LogInfo) -> impl Iterator<Item = String> {
             times => format!("{path}: {what} ({times} times)"),
         })
     })
+}
+
+/// Topics of scans and odometry with the messages of several robots.
+fn mixed_frames(info: &LogInfo) -> impl Iterator<Item = String> {
+    let is_of_one = |topic: &&TopicInfo| {
+        let type_name = full_type_name(&topic.type_name);
+        is_scan(&type_name) || type_name == Odometry::NAME
+    };
+    let own = |topic: &TopicInfo| {
+        let robot = topic.topic.split('/').nth(1).unwrap_or_default();
+        let own = |frame: &String| frame.strip_prefix(&format!("{robot}/")).unwrap_or(frame).to_owned();
+        topic.frames.iter().map(own).collect::<Vec<String>>()
+    };
+    info.topics.iter().filter(is_of_one).filter_map(move |topic| problem_of_frames(&topic.topic, own(topic).iter()))
 }
 
 fn joined(topics: &BTreeSet<String>) -> String {

@@ -2,7 +2,7 @@
 
 use super::{ChannelRouter, Route};
 use crate::names::{rename_advice, scan_rename_advice};
-use crate::robots::{Role, is_scan};
+use crate::robots::{Role, is_scan, unread_map};
 use crate::schemas::full_type_name;
 use crate::source::RobotMessages;
 use gridweave_runtime::ros::{OccupancyGrid, RosMessage};
@@ -31,6 +31,9 @@ impl ChannelRouter {
                 topics => format!(" (there are maps on {topics})"),
             };
             output.warn(format!("no map was found: no topic fits `{}`{others}", self.robots.map));
+            let unread =
+                self.routes.iter().map(|Route { channel, .. }| unread_map(&channel.topic, &channel.schema_name));
+            unread.flatten().for_each(|note| output.warn(note));
         }
         let advice = rename_advice(self.grid_topics(), &self.robots.map);
         if output.map.is_read() && !builds_maps && !advice.is_empty() {

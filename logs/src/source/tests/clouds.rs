@@ -89,3 +89,17 @@ fn a_topic_of_maps_or_scans_without_messages_hides_no_cloud() {
         assert_eq!(run.on("scans").len(), 2);
     }
 }
+
+#[test]
+fn scans_of_two_robots_on_one_topic_are_refused_unless_the_log_keeps_its_names() {
+    let (_folder, files) = write(|log| {
+        for (second, frame) in [(1, "robot1/laser"), (2, "robot1/laser"), (3, "robot2/laser")] {
+            let header = Header { frame_id: frame.into(), ..Default::default() };
+            log.add("/fleet/scan", LaserScan::NAME, second, &LaserScan { header, ..Default::default() });
+        }
+    });
+    let error = try_run(files.clone(), "", RobotTopics::default()).err().unwrap().to_string();
+    assert!(error.contains("`/fleet/scan` has the messages of several robots"), "{error}");
+    assert!(error.contains("`/robot1/scan` and `/robot2/scan`"), "{error}");
+    assert_eq!(run_as_logged(files).on("other").len(), 3);
+}

@@ -1,0 +1,72 @@
+//! Messages of several robots on one topic, which their frames alone tell apart.
+
+use super::scan_topics::is_sensor;
+use std::collections::BTreeMap;
+
+/// Words in the names of frames that say where on a robot a sensor is.
+const PLACES: [&str; 8] = ["front", "rear", "back", "left", "right", "top", "upper", "lower"];
+
+/// The first frame of each topic of one robot.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct MixedFrames(BTreeMap<String, String>);
+
+impl MixedFrames {
+    /// Adds the frame of a message on a topic of `robot`. Returns the problem if another message was another robot's.
+    pub(crate) fn add(&mut self, topic: &str, robot: &str, frame: &str) -> Option<String> {
+        let frame = frame.strip_prefix(robot).and_then(|rest| rest.strip_prefix('/')).unwrap_or(frame);
+        match self.0.get(topic) {
+            Some(first) if first == frame => None,
+            Some(first) => problem(topic, [first, frame]),
+            None => {
+                self.0.insert(topic.to_owned(), frame.to_owned());
+                None
+            }
+        }
+    }
+}
+
+/// The problem of messages on a topic in these frames if two of them are those of two robots.
+pub(crate) fn problem_of_frames<'a>(topic: &str, frames: impl Iterator<Item = &'a String> + Clone) -> Option<String> {
+    let mut pairs = frames.clone().flat_map(|one| frames.clone().map(move |other| [one.as_str(), other.as_str()]));
+    pairs.find_map(|pair| problem(topic, pair))
+}
+
+/// The problem of messages on one topic in two frames: that they are those of two robots, `robot1/laser` and
+/// `robot2/laser`. One robot may have two lidars, `front/laser` and `rear/laser`.
+fn problem(topic: &str, frames: [&str; 2]) -> Option<String> {
+    let parts =
+        |frame: &'_ str| frame.trim_start_matches('/').split_once('/').map(|(a, b)| (a.to_owned(), b.to_owned()));
+    let [(one, of_one), (other, of_other)] = [parts(frames[0])?, parts(frames[1])?];
+    let is_part = |name: &str| is_sensor(name) || name.split(['_', '-']).any(|word| PLACES.contains(&word));
+    (one != other && of_one == of_other && !is_part(&one) && !is_part(&other)).then(|| {
+        let name = topic.rsplit('/').next().unwrap_or_default();
+        format!(
+            "`{topic}` has the messages of several robots, by their frames {} and {}: record those of each robot on a topic of \
+             its own, such as `/{one}/{name}` and `/{other}/{name}`",
+            frames[0], frames[1]
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_that_differ_in_the_name_of_the_robot_alone_are_those_of_two_robots() {
+        let mut mixed = MixedFrames::default();
+        assert_eq!(mixed.add("/all/scan", "all", "all/r1/laser"), None);
+        assert_eq!(mixed.add("/all/scan", "all", "r1/laser"), None);
+        let text = mixed.add("/all/scan", "all", "all/r2/laser").unwrap();
+        assert!(
+            text.starts_with("`/all/scan` has the messages of several robots, by their frames r1/laser and r2/laser")
+        );
+        assert!(text.ends_with("such as `/r1/scan` and `/r2/scan`"), "{text}");
+        for (one, other) in
+            [("front/laser", "rear/laser"), ("laser", "lidar"), ("a/laser", "a/lidar"), ("lidar1/x", "lidar2/x")]
+        {
+            let mut mixed = MixedFrames::default();
+            assert_eq!([mixed.add("/r/scan", "r", one), mixed.add("/r/scan", "r", other)], [None, None], "{one}");
+        }
+    }
+}
