@@ -4,8 +4,8 @@ mod problems;
 
 use crate::one_map::OneMap;
 use crate::robots::{
-    Classified, InferredPoses, MapOrigin, MergedMaps, PoseSource, RobotChannels, Role, TagReader, doubtful, is_scan,
-    left_out, pose_with_covariance, unread_map,
+    CellValues, Classified, InferredPoses, MapOrigin, MergedMaps, Peculiarity, PoseSource, RobotChannels, Role,
+    TagRanges, TagReader, doubtful, is_scan, left_out, peculiarities, pose_with_covariance, unread_map,
 };
 use crate::schemas::full_type_name;
 use crate::tf::{TfPoses, is_static};
@@ -42,12 +42,13 @@ fn is_zero(count: &u64) -> bool {
     *count == 0
 }
 
-/// The leading fields of a tag range, up to the tag's id.
+/// The leading fields of a tag range, up to the range.
 #[derive(Deserialize)]
 struct TagRangeStart {
     #[serde(rename = "header")]
     _header: Header,
     tag_id: String,
+    range: f64,
 }
 
 /// Collects the contents of a log by robot, one message at a time.
@@ -68,6 +69,10 @@ pub(super) struct RobotSurvey {
     map_frames: BTreeMap<String, (String, String)>,
     /// What is said of maps that are merged ones of other programs or may be, and of lidars that are not read.
     notes: BTreeSet<String>,
+    /// By topic: what is unusual in its maps.
+    peculiarities: BTreeMap<(String, Peculiarity), String>,
+    /// By topic.
+    ranges: BTreeMap<String, TagRanges>,
     /// The robots that localise in one map.
     one_map: Option<OneMap>,
     robots: BTreeMap<String, RobotInfo>,
@@ -100,6 +105,8 @@ impl RobotSurvey {
             merged_maps: MergedMaps::default(),
             map_frames: BTreeMap::new(),
             notes: BTreeSet::new(),
+            peculiarities: BTreeMap::new(),
+            ranges: BTreeMap::new(),
             one_map: None,
             robots: BTreeMap::new(),
             unreadable: BTreeMap::new(),
@@ -161,6 +168,10 @@ impl RobotSurvey {
                 if !self.map_frames.contains_key(robot) {
                     self.map_frames.insert(robot.to_owned(), (topic.to_owned(), map.header.frame_id.clone()));
                 }
+                for (peculiarity, text) in peculiarities(data, CellValues::Auto, info.maps) {
+                    let note = || format!("maps on `{topic}`: {text}");
+                    self.peculiarities.entry((topic.to_owned(), peculiarity)).or_insert_with(note);
+                }
                 info.maps += 1;
                 if let Err(error) = map.check() {
                     let (_, count) = self.unusable_maps.entry(robot.to_owned()).or_insert((error, 0));
@@ -188,7 +199,11 @@ impl RobotSurvey {
             Role::Tags => {
                 info.readings += 1;
                 match decode::<TagRangeStart>(data) {
-                    Ok(reading) => *info.tags.entry(reading.tag_id).or_default() += 1,
+                    Ok(reading) => {
+                        let note = self.ranges.entry(topic.to_owned()).or_default().add(reading.range);
+                        self.notes.extend(note.map(|note| format!("tags on `{topic}`: {note}")));
+                        *info.tags.entry(reading.tag_id).or_default() += 1;
+                    }
                     Err(_) => *self.unreadable.entry(topic.to_owned()).or_default() += 1,
                 }
             }

@@ -115,6 +115,27 @@ fn maps_of_types_that_are_not_read_are_named_with_what_to_record() {
 }
 
 #[test]
+fn other_units_and_exchanged_values_are_reported_once() {
+    let mut log = TestLog::new(layouts()[0].clone());
+    let info = MapMetaData { width: 200, height: 100, resolution: 5.0, ..Default::default() };
+    let cells: Vec<u8> = (0..20_000).map(|index| u8::from(index % 50 > 0)).collect();
+    for second in 1..20 {
+        let map = OccupancyGrid { info, data: &cells, ..map_in("map") };
+        log.add("/r/map", OccupancyGrid::NAME, second, &map);
+        log.add("/r/tag_ranges", TagRange::NAME, second, &TagRange { range: 5230.0, ..reading("a") });
+    }
+    let problems = inspect_bytes(&log.finish()).problems;
+    for start in [
+        "maps on `/r/map`: cells of 5 m make a map of 1000 m by 500 m",
+        "maps on `/r/map`: 19600 cells have the value 1 and 400 the value 0",
+        "tags on `/r/tag_ranges`: ranges of 5230 m are too long",
+    ] {
+        let found = problems.iter().filter(|problem| problem.starts_with(start));
+        assert_eq!(found.count(), 1, "{start}: {problems:?}");
+    }
+}
+
+#[test]
 fn scans_of_two_robots_on_one_topic_are_a_problem() {
     use gridweave_runtime::ros::LaserScan;
     let mut log = TestLog::new(layouts()[3].clone());

@@ -8,38 +8,13 @@ use super::latched::Latch;
 use super::{RobotMessages, RobotReading};
 use crate::one_map::OneMap;
 use crate::robots::{
-    CellValues, MapOrigin, MergedMaps, MixedFrames, RobotChannels, Role, TagRanges, doubtful, inversion_of, left_out,
-    tilt_of, unit_of_map,
+    CellValues, MapOrigin, MergedMaps, MixedFrames, Peculiarity, RobotChannels, Role, doubtful, left_out, peculiarities,
 };
 use crate::tf::{MAP_FRAMES, is_static, tf_topic};
 use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
-use gridweave_runtime::ros::{Header, OccupancyGrid, TFMessage, TagRange, decode};
+use gridweave_runtime::ros::{Header, TFMessage, TagRange, decode};
 use gridweave_runtime::stage::{Output, RobotTopics, StageError, frame_of_robot};
 use std::collections::{BTreeMap, BTreeSet};
-
-/// The number of maps on a topic in which two values are looked for that are exchanged.
-const FIRST_MAPS: u64 = 10;
-
-/// What is warned of in the maps on a topic, once.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Peculiarity {
-    Merged,
-    Doubtful,
-    Tilted,
-    OtherUnit,
-    Inverted,
-}
-
-/// What is unusual in a map, whose values are read by `values` and before which `earlier` came on its topic.
-fn peculiarities(map: &[u8], values: CellValues, earlier: u64) -> impl Iterator<Item = (Peculiarity, String)> {
-    let grid = decode::<OccupancyGrid<'_>>(map).ok();
-    let may_be_inverted = values == CellValues::Auto && earlier < FIRST_MAPS;
-    let inversion = grid.as_ref().filter(|_| may_be_inverted).and_then(|grid| inversion_of(grid.cells()));
-    let unit = grid.and_then(|grid| unit_of_map(&grid.info));
-    let found =
-        [(Peculiarity::Tilted, tilt_of(map)), (Peculiarity::OtherUnit, unit), (Peculiarity::Inverted, inversion)];
-    found.into_iter().filter_map(|(peculiarity, text)| Some((peculiarity, text?)))
-}
 
 /// The number of messages on a topic of transforms in which frames are looked for: later ones repeat them.
 const FIRST_TRANSFORMS: u64 = 1000;
@@ -59,8 +34,6 @@ pub(super) struct ChannelRouter {
     noted: BTreeSet<(String, Peculiarity)>,
     /// The frames of scans and odometry.
     mixed_frames: MixedFrames,
-    /// By topic.
-    tag_ranges: BTreeMap<String, TagRanges>,
     routes: Vec<Route>,
     by_channel: BTreeMap<Channel, usize>,
     derived: Derived,
@@ -90,7 +63,6 @@ impl ChannelRouter {
             holds_undecided: true,
             noted: BTreeSet::new(),
             mixed_frames: MixedFrames::default(),
-            tag_ranges: BTreeMap::new(),
             routes: Vec::new(),
             by_channel: BTreeMap::new(),
             map_frames: BTreeSet::new(),
@@ -265,10 +237,8 @@ impl ChannelRouter {
                 self.pass_undecided(true, output)
             }
             Role::Tags => {
-                if let Ok(TagRange { range, .. }) = decode(data)
-                    && let Some(note) = self.tag_ranges.entry(route.channel.topic.clone()).or_default().add(range)
-                {
-                    output.warn(format!("tags on `{}`: {note}", route.channel.topic));
+                if let Ok(TagRange { range, .. }) = decode(data) {
+                    self.derived.note_range(&route.channel.topic, range, output);
                 }
                 route.send(stamp, data, &output.tags, output.log_time())
             }

@@ -45,7 +45,7 @@ impl RobotSurvey {
         let unusable = self.unusable_maps.iter();
         let unusable =
             unusable.map(|(robot, (error, count))| format!("{count} of the maps of {robot} cannot be used: {error}"));
-        unusable.chain(self.notes.iter().cloned())
+        unusable.chain(self.peculiarities.values().cloned()).chain(self.notes.iter().cloned())
     }
 
     /// The map in which several robots localise.

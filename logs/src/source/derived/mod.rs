@@ -123,6 +123,11 @@ impl Derived {
         }
     }
 
+    /// Notes the range of a tag on a topic, metres.
+    pub(super) fn note_range(&mut self, topic: &str, range: f64, output: &Output<RobotMessages>) {
+        self.tags.note_range(topic, range, output);
+    }
+
     /// Sends the maps that were updated since they were last sent.
     pub(super) fn send_updated_maps(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
         self.maps.send_updated(output)

@@ -2,10 +2,10 @@
 
 use super::super::RobotMessages;
 use super::super::channel::Route;
-use crate::robots::{Measurement, NoTransform, RobotChannels, TagPositions};
+use crate::robots::{Measurement, NoTransform, RobotChannels, TagPositions, TagRanges};
 use gridweave_runtime::ros::{Header, TFMessage, TagPosition, TagRange};
 use gridweave_runtime::stage::{Output, StageError};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Derives tag readings from messages of other types and from transforms.
 pub(super) struct DerivedTags {
@@ -13,13 +13,15 @@ pub(super) struct DerivedTags {
     positions: Option<TagPositions>,
     /// Whether any tag reading was derived from other messages.
     has_made_readings: bool,
+    /// By topic.
+    ranges: BTreeMap<String, TagRanges>,
 }
 
 impl DerivedTags {
     /// Creates the derivation for robots with the base frame `base_frame`, or one of the usual names.
     pub(super) fn new(base_frame: Option<&str>, roles: &RobotChannels) -> Self {
         let positions = roles.sees_tags().then(|| TagPositions::new(base_frame, tags_in_tf(roles)));
-        Self { positions, has_made_readings: false }
+        Self { positions, has_made_readings: false, ranges: BTreeMap::new() }
     }
 
     /// Replaces the roles. Known frames are kept.
@@ -89,6 +91,7 @@ impl DerivedTags {
             match reading.measurement {
                 Measurement::Range { range, stddev, rssi } => {
                     self.has_made_readings = true;
+                    self.note_range(&route.channel.topic, range, output);
                     let header = Header { stamp: message.stamp, frame_id: message.frame_id.clone() };
                     let tag_id = reading.tag_id;
                     output.tags.send(robot, &TagRange { header, tag_id, range, range_stddev: stddev, rssi })?;
@@ -115,6 +118,16 @@ impl DerivedTags {
             }
         }
         Ok(())
+    }
+
+    /// Notes the range of a tag on a topic, metres: a warning says so where they are in another unit.
+    pub(super) fn note_range(&mut self, topic: &str, range: f64, output: &Output<RobotMessages>) {
+        if !self.ranges.contains_key(topic) {
+            self.ranges.insert(topic.to_owned(), TagRanges::default());
+        }
+        if let Some(note) = self.ranges.get_mut(topic).and_then(|ranges| ranges.add(range)) {
+            output.warn(format!("tags on `{topic}`: {note}"));
+        }
     }
 
     fn send_position(

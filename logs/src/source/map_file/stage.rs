@@ -4,6 +4,7 @@ use super::{FileMaps, MapFileSourceParameters};
 use crate::map_file::{self, GridMap, Thresholds};
 use crate::names::name_map_files;
 use crate::qos;
+use crate::robots::unit_of_map;
 use crate::schemas::schema_text;
 use gridweave_runtime::message::{Channel, FixedText, LogTime, MessageHeader, TextTooLong};
 use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, encode};
@@ -104,6 +105,9 @@ impl NamedMap {
                     output.warn(format!("{}: {warning}", file.display()));
                 }
                 map.info.resolution = resolution.map_or(map.info.resolution, |side| side as f32);
+                if let Some(unit) = unit_of_map(&map.info) {
+                    output.warn(format!("{}: {unit}", file.display()));
+                }
                 self.send_map(&map, channel_number, output)
             }
         }
