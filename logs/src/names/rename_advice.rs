@@ -1,6 +1,7 @@
 //! Advice on `--rename` for maps and scans whose topics do not fit the pattern of the pipeline.
 
 use super::TopicRename;
+use crate::robots::is_merger;
 use gridweave_runtime::stage::match_robot;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -60,7 +61,7 @@ pub fn rename_advice<'a>(topics: impl Iterator<Item = &'a str>, pattern: &str) -
     let (named, nameless): (Vec<&str>, Vec<&str>) = single.into_iter().partition(|topic| *topic != "/map");
     let is_shared = robots.len() + named.len() > 1;
     for topic in named.into_iter().chain(nameless.into_iter().filter(|_| !is_shared)) {
-        let Some(robot) = robot_of_part(topic, &robots) else { continue };
+        let Some(robot) = robot_of_part(topic, &robots).filter(|_| !is_merger(topic)) else { continue };
         let renamed = pattern.replace(ROBOT, &robot);
         // Only a valid value of the option is advised.
         if format!("{topic}={renamed}").parse::<TopicRename>().is_ok() {
@@ -256,6 +257,8 @@ mod tests {
             &["/grid"],
             &["/x/y", "/z/w"],
             &["/global_costmap", "/a/map"],
+            &["/merged_map", "/a/map"],
+            &["/map_merged", "/a/map"],
             &[],
         ] {
             assert_eq!(advice(topics), Vec::<String>::new(), "{topics:?}");

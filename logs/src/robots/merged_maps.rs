@@ -129,7 +129,7 @@ pub(crate) fn doubtful(topic: &str, robot: &str, option: &str) -> String {
 }
 
 /// Whether a name is that of a program that merges maps.
-fn is_merger(name: &str) -> bool {
+pub(crate) fn is_merger(name: &str) -> bool {
     let name = name.to_lowercase();
     MERGERS.iter().any(|part| name.contains(part))
 }

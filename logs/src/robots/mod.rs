@@ -24,7 +24,7 @@ mod units;
 pub use cell_values::CellValues;
 pub(crate) use channels::RobotChannels;
 pub(crate) use inferred_poses::InferredPoses;
-pub(crate) use merged_maps::{MapOrigin, MergedMaps, doubtful, left_out};
+pub(crate) use merged_maps::{MapOrigin, MergedMaps, doubtful, is_merger, left_out};
 pub(crate) use mixed_frames::{MixedFrames, problem_of_frames};
 pub(crate) use mounts::NoTransform;
 pub(crate) use other_maps::unread_map;
