@@ -238,35 +238,3 @@ impl Parameters for SimulatorParameters {
         errors
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn wrong(change: impl FnOnce(&mut SimulatorParameters)) -> Vec<String> {
-        let mut parameters = SimulatorParameters::default();
-        change(&mut parameters);
-        parameters.check().into_iter().map(|error| error.field).collect()
-    }
-
-    #[test]
-    fn the_defaults_are_in_range() {
-        assert!(SimulatorParameters::default().check().is_empty());
-    }
-
-    #[test]
-    fn values_out_of_range_are_named() {
-        assert_eq!(wrong(|p| p.robots = 0), ["robots"]);
-        assert_eq!(wrong(|p| p.robots = 65), ["robots"]);
-        assert_eq!(wrong(|p| p.overlap = f64::NAN), ["overlap"]);
-        assert_eq!(wrong(|p| (p.width, p.tag_noise) = (5.0, -1.0)), ["width", "tag_noise"]);
-        assert_eq!(wrong(|p| p.resolution = vec![]), ["resolution"]);
-        assert_eq!(wrong(|p| p.resolution = vec![0.05, 0.0, f64::NAN]), ["resolution"]);
-    }
-
-    #[test]
-    fn a_map_that_would_fill_the_memory_is_refused() {
-        let huge = |p: &mut SimulatorParameters| (p.width, p.height, p.resolution) = (300.0, 300.0, vec![0.01]);
-        assert_eq!(wrong(huge), ["resolution"]);
-    }
-}

@@ -246,46 +246,10 @@ fn send_map(output: &Output<SimulatedLog>, log: &RobotLog, index: usize) -> Resu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shared::geometry::Grid;
     use gridweave_runtime::message::Message;
     use gridweave_runtime::stage::StageHarness;
 
     const WORLD: &str = "robots = 2\nwidth = 10\nheight = 9\nbeams = 60\ntags = 8\nduration = 20";
-
-    /// What is sent on the ports `map`, `pose`, `tags`, `tf` and `truth`.
-    fn run(parameters: &str, seed: u64) -> Result<[Vec<Message>; 5], StageError> {
-        let context = Context { stage: "world".into(), seed, ..Default::default() };
-        let mut stage = StageHarness::with_context(&kind(), parameters, &context)?;
-        while stage.node().advance()? {
-            assert!((0.0..1.0).contains(&stage.node().progress().unwrap()));
-        }
-        assert_eq!(stage.node().progress(), Some(1.0));
-        assert!(!stage.node().advance()?, "it stays at its end");
-        Ok(["map", "pose", "tags", "tf", "truth"].map(|port| stage.take_messages(port)))
-    }
-
-    #[test]
-    fn the_messages_are_those_of_a_log() {
-        let [maps, poses, tags, tf, _] = run(WORLD, 1).unwrap();
-        assert_eq!((maps.len(), poses.len(), tf.len()), (6, 400, 400));
-        assert_eq!(maps[0].header().topic.as_str(), "/robot1/map");
-        assert_eq!(poses[0].header().topic.as_str(), "/robot1/pose");
-        assert!(tags[0].header().topic.as_str().ends_with("/tag_ranges"));
-        assert_eq!(tf[0].header().topic.as_str(), "/tf");
-
-        let pose: PoseStamped = poses[0].decode().unwrap();
-        assert_eq!((pose.header.frame_id.as_str(), poses[0].header().log_time), ("robot1/map", START));
-        let tf: TFMessage = tf[0].decode().unwrap();
-        assert_eq!(tf.transforms[0].child_frame_id, "robot1/base_link");
-        assert!((tf.transforms[0].transform.translation.x - pose.pose.position.x).abs() < 1e-12);
-        let range: TagRange = tags[0].decode().unwrap();
-        assert!(range.header.frame_id.ends_with("/base_link") && range.range_stddev == 0.05);
-        for message in &maps {
-            let map: OccupancyGrid<'_> = message.decode().unwrap();
-            assert!(Grid::from_message(&map).unwrap().occupied().count() > 50);
-            assert_eq!(map.header.frame_id, format!("{}/map", message.robot()));
-        }
-    }
 
     #[test]
     fn odometry_begins_at_the_first_pose_and_drifts_off() {
@@ -304,40 +268,5 @@ mod tests {
             (pose.x - by_odometry.x).hypot(pose.y - by_odometry.y)
         };
         assert!(off(0) < 1e-9 && off(poses.len() - 1) > 0.02, "{}", off(poses.len() - 1));
-    }
-
-    #[test]
-    fn the_truth_is_sent_once_when_the_log_begins() {
-        let [.., truth] = run(WORLD, 1).unwrap();
-        assert_eq!(truth.len(), 1);
-        let header = truth[0].header();
-        assert_eq!((header.topic.as_str(), header.log_time, truth[0].robot()), ("/truth", START, ""));
-        let truth: SimulationTruth = truth[0].decode().unwrap();
-        assert_eq!(truth.header, Header::new(START, "robot1/map"));
-        assert!(truth.frames.len() == 2 && !truth.tags.is_empty());
-    }
-
-    #[test]
-    fn a_seed_gives_the_same_bytes() {
-        let bytes = |seed| {
-            let ports = run(WORLD, seed).unwrap();
-            ports.iter().flatten().map(|message| message.bytes().to_vec()).collect::<Vec<Vec<u8>>>()
-        };
-        assert!(bytes(7) == bytes(7));
-        assert!(bytes(7) != bytes(8));
-    }
-
-    #[test]
-    fn every_port_is_in_the_order_of_time() {
-        for port in run(WORLD, 3).unwrap() {
-            assert!(port.is_sorted_by_key(|message| message.header().log_time));
-        }
-    }
-
-    #[test]
-    fn parameters_out_of_range_and_unknown_ones_are_refused() {
-        for wrong in ["robots = 0", "overlap = 1.5", "resolution = []", "robot = 3", "speed = \"fast\""] {
-            assert!(run(wrong, 1).is_err(), "{wrong}");
-        }
     }
 }

@@ -38,6 +38,7 @@ mod mirrored_tag;
 mod names;
 mod one_map;
 mod output_files;
+mod parameter_ranges;
 mod processes;
 mod python_libraries;
 mod python_stages;

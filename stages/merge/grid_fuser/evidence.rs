@@ -200,35 +200,6 @@ mod tests {
     }
 
     #[test]
-    fn evidence_adds() {
-        assert_eq!(fuse(&[70, 70]), 84);
-        assert_eq!(fuse(&[30, 30]), 16);
-        assert_eq!(fuse(&[50, 80]), 80);
-        assert_eq!(fuse(&[70, 30]), 50);
-        assert_eq!(fuse(&[100, 100]), 100);
-        assert_eq!(fuse(&[0, 0, 0]), 0);
-    }
-
-    #[test]
-    fn one_wall_outweighs_one_free_cell_but_not_two() {
-        assert!(is_occupied(fuse(&[100, 0])));
-        assert!(!is_occupied(fuse(&[100, 0, 0])));
-        assert!(is_free(fuse(&[100, 0, 0, 0])));
-    }
-
-    #[test]
-    fn a_conflict_is_as_strong_as_the_weaker_side() {
-        assert_eq!(conflict(&[100, 0]), 100);
-        assert_eq!(conflict(&[100, 100]), 0);
-        assert_eq!(conflict(&[50, 100]), 0);
-        // ln(0.7 / 0.3) of ln(0.971 / 0.029), though 0 could say more.
-        assert_eq!(conflict(&[70, 0]), 24);
-        assert_eq!(conflict(&[70, 70, 0]), 48);
-        // ln(0.7 / 0.3) of ln(0.8808 / 0.1192).
-        assert_eq!(conflict(&[30, 100]), 42);
-    }
-
-    #[test]
     fn any_number_of_maps_can_be_added() {
         assert_eq!(fuse(&[100; 5000]), 100);
         assert_eq!(fuse(&[0; 5000]), 0);

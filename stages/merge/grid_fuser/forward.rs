@@ -89,61 +89,8 @@ impl Sum {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shared::geometry::{Grid, Pose2, pose};
+    use crate::shared::geometry::{Pose2, pose};
     use nalgebra::{Isometry2, Translation2};
-
-    /// The paper's points are integers, and a grid's are the centres of its cells.
-    fn golden_area(value: i8) -> (Vec<i8>, GridGeometry, Pose2, GridGeometry) {
-        let area = GridGeometry { width: 5, height: 5, resolution: 1.0, origin: pose(97.5, 97.5, 0.0) };
-        let turn = Isometry2::rotation(30f64.to_radians());
-        let transform = Translation2::new(300.0, 300.0) * turn * Translation2::new(-200.0, -200.0);
-        let output = GridGeometry { width: 400, height: 400, resolution: 1.0, origin: pose(0.0, 0.0, 0.0) };
-        (vec![value; 25], area, transform, output)
-    }
-
-    fn known(cells: &[i8]) -> usize {
-        cells.iter().filter(|value| **value != UNKNOWN).count()
-    }
-
-    #[test]
-    fn equation_15_leaves_23_cells_with_two_holes_and_the_mean_closes_both() {
-        let (cells, area, transform_world_map, output) = golden_area(0);
-        let map = PlacedGrid::rigid(Grid::new(area, &cells).unwrap(), transform_world_map);
-        let carried = carry(&map, &output);
-        assert_eq!(known(&carried), 23);
-        let closed = close_gaps(&carried, &output);
-        assert_eq!(known(&closed), 25);
-        let holes: Vec<usize> = (0..closed.len()).filter(|&index| carried[index] != closed[index]).collect();
-        for hole in holes {
-            // Four known sides make it a hole.
-            for side in [hole - 1, hole + 1, hole - 400, hole + 400] {
-                assert_ne!(carried[side], UNKNOWN);
-            }
-            assert_eq!(closed[hole], 0);
-        }
-    }
-
-    #[test]
-    fn the_mean_spreads_neither_walls_nor_the_known_area() {
-        let geometry = GridGeometry { width: 5, height: 3, resolution: 1.0, origin: Pose2::identity() };
-        #[rustfmt::skip]
-        let cells = [
-            100, 100, 100, -1, -1,
-             10,  -1,  10, -1, -1,
-             20,  20,  20, -1, -1,
-        ];
-        let mut expected = cells;
-        expected[6] = 16;
-        assert_eq!(close_gaps(&cells, &geometry), expected);
-    }
-
-    #[test]
-    fn a_gap_in_a_thick_wall_is_wall() {
-        let geometry = GridGeometry { width: 3, height: 3, resolution: 1.0, origin: Pose2::identity() };
-        let mut cells = [90; 9];
-        cells[4] = UNKNOWN;
-        assert_eq!(close_gaps(&cells, &geometry), [90; 9]);
-    }
 
     #[test]
     fn grids_without_cells_have_no_gaps() {

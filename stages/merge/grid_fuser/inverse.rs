@@ -269,31 +269,4 @@ mod tests {
             prop_assert!((385..=415).contains(&known), "the area stays: {known} cells");
         }
     }
-
-    #[test]
-    fn a_coarse_map_is_resampled_to_the_finest_resolution() {
-        let (coarse, fine) = ([0, 100, -1, 50], [0; 4]);
-        let coarse = Grid::new(geometry(2, 2, 0.1, Pose2::identity()), &coarse).unwrap();
-        let fine = Grid::new(geometry(2, 2, 0.05, pose(-0.1, 0.0, 0.0)), &fine).unwrap();
-        let maps = [fine, coarse].map(|grid| PlacedGrid::rigid(grid, Pose2::identity()));
-        let (fused_geometry, fused) = fuse_all(&maps);
-        assert_eq!((fused_geometry.width, fused_geometry.height, fused_geometry.resolution), (6, 4, 0.05));
-        #[rustfmt::skip]
-        assert_eq!(fused, [
-             0,  0,  0,  0, 100, 100,
-             0,  0,  0,  0, 100, 100,
-            -1, -1, -1, -1,  50,  50,
-            -1, -1, -1, -1,  50,  50,
-        ]);
-    }
-
-    #[test]
-    fn the_yaw_of_a_grids_origin_is_applied() {
-        let cells = [100, 0, 0, 0, 0, 0];
-        let turned = Grid::new(geometry(3, 2, 1.0, pose(0.0, 0.0, std::f64::consts::FRAC_PI_2)), &cells).unwrap();
-        let (fused_geometry, fused) = fuse_all(&[PlacedGrid::rigid(turned, Pose2::identity())]);
-        assert_eq!((fused_geometry.width, fused_geometry.height), (2, 3));
-        assert!((fused_geometry.origin.translation.x + 2.0).abs() < 1e-12);
-        assert_eq!(fused, [0, 100, 0, 0, 0, 0]);
-    }
 }

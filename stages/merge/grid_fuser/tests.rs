@@ -3,7 +3,7 @@
 use super::kind;
 use gridweave_runtime::message::{LogTime, Message, MessageHeader, Write, write_vec};
 use gridweave_runtime::ros::{
-    DeformationNode, Header, MapAgreement, MapDeformation, MapMetaData, OccupancyGrid, Pose, RobotFrame, RobotFrames,
+    DeformationNode, MapAgreement, MapDeformation, MapMetaData, OccupancyGrid, Pose, RobotFrame, RobotFrames,
     UnmergedRobot, encode,
 };
 use gridweave_runtime::stage::{Context, OutputEnd, OutputSink, StageError, StageHarness};
@@ -47,16 +47,6 @@ impl Run {
     fn finish(&mut self) -> Vec<Fused> {
         self.0.finish(LogTime(9)).unwrap();
         self.fused()
-    }
-
-    /// Messages sent on `conflicts` and `agreement`.
-    fn conflicts(&mut self) -> (Vec<Vec<i8>>, Vec<MapAgreement>) {
-        let read = |message: &Message| {
-            assert_eq!(message.header().topic.as_str(), "/map_conflicts");
-            message.decode::<OccupancyGrid<'_>>().unwrap().cells().to_vec()
-        };
-        let conflicts = self.0.take_messages("conflicts").iter().map(read).collect();
-        (conflicts, self.0.take("agreement").unwrap())
     }
 
     fn fused(&mut self) -> Vec<Fused> {
@@ -116,93 +106,12 @@ fn a_deformation_without_frames_is_applied_at_the_end_and_an_invalid_one_is_left
 }
 
 #[test]
-fn maps_are_fused_once_their_robots_are_placed() {
-    let mut run = Run::new("");
-    assert!(run.map("robot1", 0.0, &[0, 100, -1]).is_empty(), "nothing is placed");
-    assert_eq!(run.frames(&[("robot1", 0.0)]), [(2, 1, vec![0, 100])]);
-    assert!(run.map("robot2", 0.0, &[50, 60]).is_empty(), "robot2 is not placed");
-    let fused = run.frames(&[("robot1", 0.0), ("robot2", 3.0)]);
-    assert_eq!(fused, [(5, 1, vec![0, 100, -1, 50, 60])]);
-    assert_eq!(run.map("robot2", 0.0, &[70]), [(4, 1, vec![0, 100, -1, 70])]);
-    assert!(run.finish().is_empty(), "the last state is out");
-}
-
-#[test]
-fn frames_that_hardly_change_wait_for_the_end() {
-    let mut run = Run::new("");
-    run.map("robot1", 0.0, &[0]);
-    run.map("robot2", 0.0, &[100]);
-    assert_eq!(run.frames(&[("robot1", 0.0), ("robot2", 1.0)]).len(), 1);
-    assert!(run.frames(&[("robot1", 0.0), ("robot2", 1.0)]).is_empty());
-    assert!(run.frames(&[("robot1", 0.0), ("robot2", 1.01)]).is_empty());
-    assert_eq!(run.frames(&[("robot1", 0.0), ("robot2", 1.03)]).len(), 1);
-    assert!(run.frames(&[("robot1", 0.0), ("robot2", 1.04)]).is_empty());
-    assert_eq!(run.finish().len(), 1);
-}
-
-#[test]
-fn a_robot_that_is_no_longer_placed_leaves_the_map() {
-    let mut run = Run::new("");
-    run.map("robot1", 0.0, &[0]);
-    run.map("robot2", 0.0, &[100]);
-    run.frames(&[("robot1", 0.0), ("robot2", 1.0)]);
-    assert_eq!(run.frames(&[("robot1", 0.0)]), [(1, 1, vec![0])]);
-}
-
-#[test]
 fn a_frame_without_a_map_changes_nothing_until_the_map_comes() {
     let mut run = Run::new("");
     run.map("robot1", 0.0, &[0]);
     run.frames(&[("robot1", 0.0)]);
     assert!(run.frames(&[("robot1", 0.0), ("robot2", 1.0)]).is_empty());
     assert_eq!(run.map("robot2", 0.0, &[100]), [(2, 1, vec![0, 100])]);
-}
-
-#[test]
-fn absurd_frames_and_broken_maps_are_warned_of_and_left_out() {
-    let mut run = Run::new("");
-    run.map("robot1", 0.0, &[0]);
-    run.map("robot2", 0.0, &[100]);
-    for x in [f64::NAN, f64::INFINITY, -5e4, 1e308] {
-        assert_eq!(run.frames(&[("robot1", 0.0), ("robot2", x)]), [(1, 1, vec![0])]);
-    }
-    assert_eq!(run.0.warnings().values().sum::<u64>(), 4);
-    assert!(run.map("robot1", f64::NAN, &[0]).is_empty());
-    run.0.give_bytes("map", "robot1", TIME, vec![1, 2, 3]).unwrap();
-    run.0.give_bytes("frames", "", TIME, vec![0, 1]).unwrap();
-    assert!(run.fused().is_empty());
-    assert_eq!(run.0.warnings().values().sum::<u64>(), 7);
-}
-
-#[test]
-fn both_warps_give_the_same_where_nothing_is_turned() {
-    for parameters in ["warp = 'inverse'", "warp = 'forward'"] {
-        let mut run = Run::new(parameters);
-        run.map("robot1", -0.5, &[0, 70, -1, 20]);
-        run.map("robot2", 0.0, &[100, -1, 30]);
-        let fused = run.frames(&[("robot1", 0.0), ("robot2", 0.5)]);
-        assert_eq!(fused, [(4, 1, vec![0, 100, -1, 0])], "{parameters}");
-    }
-}
-
-#[test]
-fn conflicts_are_on_the_cells_of_the_fused_map_and_their_area_is_sent() {
-    for parameters in ["warp = 'inverse'", "warp = 'forward'"] {
-        let mut run = Run::new(parameters);
-        run.map("robot1", 0.0, &[0, 100, 100, -1, 0]);
-        run.map("robot2", 0.0, &[0, 0, 100, 0, 30]);
-        let agreement = |known_to_one, known_to_several, in_conflict| MapAgreement {
-            header: Header::new(TIME, "world"),
-            known_to_one,
-            known_to_several,
-            in_conflict,
-        };
-        run.frames(&[("robot1", 0.0)]);
-        assert_eq!(run.conflicts(), (vec![vec![-1; 5]], vec![agreement(4.0, 0.0, 0.0)]));
-        run.frames(&[("robot1", 0.0), ("robot2", 1.0)]);
-        let expected = (vec![vec![-1, 100, 100, -1, 0, -1]], vec![agreement(3.0, 3.0, 2.0)]);
-        assert_eq!(run.conflicts(), expected, "{parameters}");
-    }
 }
 
 #[derive(Clone, Default)]
@@ -240,38 +149,4 @@ fn an_output_is_the_same_if_nothing_else_is_read() {
     for (port, messages) in all.iter().enumerate() {
         assert_eq!(&sent(std::array::from_fn(|other| other == port))[port], messages);
     }
-}
-
-#[test]
-fn nothing_is_sent_without_a_map() {
-    let mut run = Run::new("");
-    run.map("robot1", 0.0, &[-1]);
-    run.frames(&[("robot1", 0.0)]);
-    assert_eq!(run.conflicts(), (Vec::new(), Vec::new()));
-}
-
-#[test]
-fn the_resolution_can_be_set() {
-    let mut run = Run::new("resolution = 0.5");
-    run.map("robot1", 0.0, &[0, 100]);
-    let fused = run.frames(&[("robot1", 0.0)]);
-    assert_eq!(fused, [(4, 2, vec![0, 0, 100, 100, 0, 0, 100, 100])]);
-}
-
-#[test]
-fn empty_maps_give_no_map() {
-    let mut run = Run::new("");
-    assert!(run.finish().is_empty());
-    run.map("robot1", 0.0, &[-1, -1]);
-    run.map("robot2", 0.0, &[]);
-    assert!(run.frames(&[("robot1", 0.0), ("robot2", 0.5)]).is_empty());
-    assert!(run.0.warnings().is_empty());
-}
-
-#[test]
-fn parameters_out_of_range_are_reported() {
-    let bad = "resolution = 0.0\nmax_probability = 1.0\nmin_probability = 0.0\nmin_move = -1.0\nmin_turn = nan\n\
-               max_extent = inf\nmax_cells = 0";
-    assert_eq!(kind().check_parameters(&toml::from_str(bad).unwrap()).unwrap().len(), 7);
-    assert!(kind().check_parameters(&toml::Table::new()).unwrap().is_empty());
 }

@@ -6,7 +6,7 @@ use crate::registration::pose_window::PoseWindow;
 use crate::registration::{Basis, Hypothesis};
 use crate::shared::geometry::{Point2, Pose2, point_jacobian, pose};
 use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, deformation_at, drawing, seen};
-use gridweave_runtime::stage::{InitialPose, Parameters};
+use gridweave_runtime::stage::InitialPose;
 use nalgebra::{Matrix3, Vector2};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -67,26 +67,6 @@ fn reason(verdict: &Verdict) -> String {
 }
 
 #[test]
-fn right_hypotheses_are_accepted_from_tags_and_from_maps() {
-    let (a, b) = office_maps();
-    let truth = a.transform_to(&b);
-    let tags = [by_tags(&truth)];
-    let verdict = judged(&a, &b, &tags);
-    assert_eq!(verdict.refusal, None);
-    assert!(verdict.candidate.agreement.inlier_ratio() > 0.95);
-    assert!(reason(&verdict).contains("\n\nfour tags; the maps confirm it"), "{}", reason(&verdict));
-    let elsewhere = pose(1.5, 0.0, 0.0) * truth;
-    let maps = by_maps(&[truth, elsewhere]);
-    let verdict = judged(&a, &b, &maps);
-    assert_eq!((verdict.refusal.clone(), verdict.candidate.number), (None, 0), "{}", reason(&verdict));
-    assert!(verdict.second_best.as_ref().is_some_and(|second| (second.shift - 1.5).abs() < 0.05));
-    assert!(verdict.probability > 0.98);
-    let maps = by_maps(&[elsewhere, truth]);
-    let verdict = judged(&a, &b, &maps);
-    assert!(verdict.candidate.number == 1 && verdict.probability > 0.5, "the walls count more than the peak");
-}
-
-#[test]
 fn a_deformed_map_is_compared_with_its_deformation_and_its_pose_is_the_nearest_rigid_one() {
     const MOST: f64 = 1.0;
     let a = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
@@ -129,35 +109,6 @@ fn the_map_of_another_building_is_not_deformed_to_fit() {
         let verdict = judged(&a, &b, &maps);
         assert!(verdict.refusal.is_some(), "{}", reason(&verdict));
     }
-}
-
-#[test]
-fn poses_that_fit_equally_well_are_ambiguous_and_tags_decide_between_them() {
-    let plan = FloorPlan::symmetric();
-    let part = seen(-0.2, -0.2, 20.2, 12.2);
-    let (a, b) = (plan.draw(part, drawing(10.0, 6.0, 0.0)), plan.draw(part, drawing(10.0, 6.0, 0.7)));
-    let truth = a.transform_to(&b);
-    let turned = pose(0.0, 0.0, PI) * truth;
-    let maps = by_maps_alike(&[truth, turned]);
-    let verdict = judged(&a, &b, &maps);
-    let Some(Refusal::Ambiguous { turn, probability, listed, .. }) = &verdict.refusal else { panic!("{verdict:?}") };
-    assert!((turn.abs() - 180.0).abs() < 0.1 && *probability > 0.01 && listed.0.len() == 2);
-    assert!(reason(&verdict).contains("the evidence does not decide which is right"), "{}", reason(&verdict));
-
-    let both: Vec<Hypothesis> = [vec![by_tags(&truth)], by_maps_alike(&[turned, truth])].concat();
-    let verdict = judged(&a, &b, &both);
-    assert_eq!(verdict.refusal, None, "{}", reason(&verdict));
-    assert!(verdict.candidate.hypothesis.transform_a_b == truth);
-    assert!(verdict.also_found_by().is_some());
-}
-
-#[test]
-fn tags_lose_where_the_maps_do_not_fit() {
-    let (a, b) = office_maps();
-    let truth = a.transform_to(&b);
-    let hypotheses: Vec<Hypothesis> = [vec![by_tags(&(pose(1.5, 0.0, 0.0) * truth))], by_maps(&[truth])].concat();
-    let verdict = judged(&a, &b, &hypotheses);
-    assert!(verdict.refusal.is_none() && verdict.candidate.hypothesis.source == "maps");
 }
 
 /// Furniture was moved all over the building, so that the maps contradict each other in much at their right place.
@@ -205,28 +156,6 @@ fn walls_on_free_space_are_refused() {
         let hypotheses = [by_tags(&wrong)];
         assert!(judged(&a, &b, &hypotheses).refusal.is_some(), "{x} {y} {yaw}");
     }
-}
-
-#[test]
-fn a_mirrored_map_and_another_building_are_refused() {
-    let part = seen(-0.2, -0.2, 20.2, 12.2);
-    let a = FloorPlan::office().draw(part, drawing(3.0, 2.0, 0.4));
-    for other in [FloorPlan::office().mirrored(6.0), FloorPlan::another_office()] {
-        let b = other.draw(part, drawing(12.0, 6.0, -2.1));
-        let hypotheses = [by_tags(&a.transform_to(&b))];
-        let verdict = judged(&a, &b, &hypotheses);
-        assert!(matches!(verdict.refusal, Some(Refusal::Contradiction { .. })), "{}", reason(&verdict));
-    }
-}
-
-#[test]
-fn maps_that_hardly_overlap_are_refused() {
-    let office = FloorPlan::office();
-    let a = office.draw(seen(-0.2, -0.2, 8.0, 12.2), drawing(3.0, 2.0, 0.4));
-    let b = office.draw(seen(7.7, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
-    let hypotheses = [by_tags(&a.transform_to(&b))];
-    let verdict = judged(&a, &b, &hypotheses);
-    assert!(matches!(verdict.refusal, Some(Refusal::Chance { .. })), "{}", reason(&verdict));
 }
 
 #[test]
@@ -284,21 +213,6 @@ fn the_wrong_quarter_is_refused() {
         let verdict = judged(&a, &b, &hypotheses);
         assert!(verdict.refusal.is_some(), "{turn}: {}", reason(&verdict));
     }
-}
-
-#[test]
-fn the_defaults_are_in_range_and_nonsense_is_not() {
-    assert!(JudgementParameters::default().check().is_empty());
-    let nonsense = JudgementParameters {
-        accept: 1.5,
-        wall_tolerance: 0.0,
-        region: f64::NAN,
-        region_deviation: -1.0,
-        bend: 1e-200,
-        turn: 0.0,
-        ..JudgementParameters::default()
-    };
-    assert_eq!(nonsense.check().len(), 6);
 }
 
 /// A symmetric building, twice, and a pose in each of its halves.

@@ -4,7 +4,7 @@ use crate::shared::geometry::{Pose2, pose};
 use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
 use crate::shared::test_world::stage_bench::StageBench;
 use gridweave_runtime::message::LogTime;
-use gridweave_runtime::ros::{Alignment, Evidence, Header};
+use gridweave_runtime::ros::{Alignment, Header};
 use gridweave_runtime::stage::{Context, InitialPose, InitialPoses};
 
 /// West and east.
@@ -31,46 +31,6 @@ fn proposed(source: &str, transform_a_b: &Pose2) -> Alignment {
     };
     alignment.set_transform_a_b(transform_a_b);
     alignment
-}
-
-#[test]
-fn an_alignment_is_judged_once_both_maps_are_there_and_again_with_every_new_map() {
-    let (a, b) = maps();
-    let mut bench = StageBench::new(&super::kind(), "");
-    let truth = a.transform_to(&b);
-    assert_eq!(bench.give(&Alignment { provisional: true, rank: 0, ..proposed("tags", &truth) }), []);
-    assert_eq!(bench.give_map("robot1", &a), []);
-    let sent = bench.give_map("robot2", &b);
-    let [judged] = sent.as_slice() else { panic!("{sent:?}") };
-    assert!(judged.accepted && !judged.provisional, "{}", judged.reason);
-    assert_eq!(judged.header, Header::new(LogTime(3_000_000_000), "robot1/map"));
-    assert!(judged.score > 0.9 && judged.transform_a_b() == proposed("tags", &truth).transform_a_b());
-    assert_eq!(bench.give_map("robot2", &b), [], "nothing has changed");
-    let other = FloorPlan::another_office().draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
-    let sent = bench.give_map("robot2", &other);
-    assert!(!sent[0].accepted && sent[0].reason.contains("the maps do not confirm it"), "{}", sent[0].reason);
-    assert_eq!(bench.finish(), []);
-}
-
-#[test]
-fn evidence_is_sent_when_it_changes() {
-    let (a, b) = maps();
-    let mut bench = StageBench::new(&super::kind(), "");
-    bench.give(&proposed("tags", &a.transform_to(&b)));
-    bench.give_map("robot1", &a);
-    assert_eq!(bench.stage.take::<Evidence>("evidence").unwrap(), [], "nothing has been judged");
-    bench.give_map("robot2", &b);
-    let sent: Vec<Evidence> = bench.stage.take("evidence").unwrap();
-    let [first] = sent.as_slice() else { panic!("{sent:?}") };
-    assert_eq!((first.a.as_str(), first.b.as_str(), first.hypotheses), ("robot1", "robot2", 1));
-    assert_eq!(first.header, Header::new(LogTime(3_000_000_000), "robot1/map"));
-    assert!(first.overlap > 80.0 && first.wall_on_wall > 10.0 * first.wall_on_free, "{first:?}");
-    bench.give_map("robot2", &b);
-    assert_eq!(bench.stage.take::<Evidence>("evidence").unwrap(), [], "nothing has changed");
-    bench.give(&proposed("maps", &(pose(1.5, 0.0, 0.0) * a.transform_to(&b))));
-    let sent: Vec<Evidence> = bench.stage.take("evidence").unwrap();
-    assert_eq!((sent.len(), sent[0].hypotheses, sent[0].overlap), (1, 2, first.overlap));
-    assert!(sent[0].evidence_elsewhere > 0.0 || first.evidence_elsewhere == 0.0, "{sent:?}");
 }
 
 #[test]
@@ -127,39 +87,6 @@ fn a_plug_in_is_trusted_where_a_search_of_the_maps_finds_the_same_pose_only() {
     bench.give_map("robot2", &b);
     let sent = bench.give(&by_a_plug_in(&a.transform_to(&b)));
     assert!(!sent[0].accepted && sent[0].score < 0.9, "{sent:?}");
-}
-
-#[test]
-fn a_pair_without_any_pose_is_refused_with_all_reasons() {
-    let mut bench = StageBench::new(&super::kind(), "");
-    let nothing = |source: &str, reason: &str| Alignment {
-        accepted: false,
-        has_transform: false,
-        reason: reason.into(),
-        ..proposed(source, &Pose2::identity())
-    };
-    assert_eq!(bench.give(&nothing("maps", "no walls"))[0].reason, "no walls");
-    let sent = bench.give(&nothing("tags", "no tags"));
-    assert_eq!((sent[0].accepted, sent[0].reason.as_str()), (false, "no walls\n\nby the tags: no tags"));
-    assert_eq!(bench.give(&nothing("tags", "no tags")), []);
-    assert_eq!(bench.finish(), []);
-}
-
-#[test]
-fn a_pair_that_waits_for_a_map_to_the_end_is_refused() {
-    let (a, _) = maps();
-    let mut bench = StageBench::new(&super::kind(), "");
-    bench.give_map("robot1", &a);
-    bench.give(&proposed("tags", &Pose2::identity()));
-    let sent = bench.finish();
-    assert!(!sent[0].accepted && sent[0].reason.contains("no usable map of robot2"), "{}", sent[0].reason);
-}
-
-#[test]
-fn a_hypothesis_out_of_order_gives_a_warning() {
-    let mut bench = StageBench::new(&super::kind(), "");
-    bench.give(&Alignment { rank: 2, hypotheses: 4, ..proposed("maps", &Pose2::identity()) });
-    assert_eq!(bench.stage.warnings().len(), 1, "{:?}", bench.stage.warnings());
 }
 
 /// Two robots with known initial poses.

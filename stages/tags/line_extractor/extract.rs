@@ -256,18 +256,6 @@ mod tests {
     }
 
     #[test]
-    fn grids_without_walls_have_none() {
-        let parameters = LineExtractorParameters::default();
-        for value in [-1, 0, 50, i8::MIN] {
-            for (width, height) in [(0, 0), (1, 1), (50, 40)] {
-                let geometry = GridGeometry { width, height, resolution: 0.05, origin: pose(0.0, 0.0, 0.0) };
-                let cells = vec![value; width * height];
-                assert_eq!(extract_segments(&Grid::new(geometry, &cells).unwrap(), &parameters, 1), []);
-            }
-        }
-    }
-
-    #[test]
     fn odd_grids_do_no_harm() {
         let parameters = LineExtractorParameters::default();
         for resolution in [1e-9, 0.05, 5.0, 1e300] {

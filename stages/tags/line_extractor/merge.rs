@@ -78,14 +78,6 @@ mod tests {
     }
 
     #[test]
-    fn parts_of_one_wall_become_one() {
-        let walls = merged(&[(0..20, 5.0), (48..60, 5.3), (22..46, 5.2)]);
-        assert_eq!(walls.len(), 1);
-        assert_eq!(walls[0].members.len(), 56);
-        assert!((walls[0].stretch.length() - 59.0).abs() < 0.1);
-    }
-
-    #[test]
     fn walls_that_are_far_apart_or_side_by_side_or_at_an_angle_stay_two() {
         assert_eq!(merged(&[(0..20, 5.0), (40..60, 5.0)]).len(), 2);
         assert_eq!(merged(&[(0..20, 5.0), (0..20, 9.0)]).len(), 2);

@@ -122,35 +122,3 @@ impl Default for LineExtractorParameters {
 }
 
 impl Parameters for LineExtractorParameters {}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_defaults_are_in_range() {
-        assert_eq!(LineExtractorParameters::default().check(), []);
-    }
-
-    #[test]
-    fn every_value_out_of_range_is_reported() {
-        let parameters = LineExtractorParameters {
-            sampling_radius: f64::NAN,
-            max_points: 1,
-            inlier_distance: 0.0,
-            min_points: 0,
-            min_share: 1.5,
-            stop_share: -0.1,
-            candidates: 0,
-            patience: 0,
-            max_iterations: 0,
-            max_gap: -1.0,
-            merge_angle: 2.0,
-            merge_distance: f64::INFINITY,
-            min_length: 0.0,
-            min_reliability: f64::NAN,
-            ..Default::default()
-        };
-        assert_eq!(parameters.check().len(), 14);
-    }
-}

@@ -243,29 +243,6 @@ mod tests {
     }
 
     #[test]
-    fn the_rule_of_the_paper_finds_two_long_walls_and_nothing_among_many() {
-        let paper = LineExtractorParameters {
-            sampling: Sampling::Uniform,
-            scoring: Scoring::Percentage,
-            fit: crate::tags::line_extractor::Fit::Ends,
-            stop_share: 0.5,
-            candidates: 1,
-            max_iterations: 500,
-            ..Default::default()
-        };
-        let cross: Vec<Point2> =
-            line_of_points(50.0, 50.0, 0.2, 200).chain(line_of_points(60.0, 180.0, 0.2, 200)).collect();
-        let walls = walls_of(&cross, &paper);
-        assert!(!walls.is_empty());
-        assert!(walls.iter().all(|wall| wall.members.len() == 200), "{walls:?}");
-
-        let many: Vec<Point2> =
-            (0..20).flat_map(|i| line_of_points(20.0 + 15.0 * f64::from(i), 30.0, 1.3, 40)).collect();
-        let long = walls_of(&many, &paper).iter().filter(|wall| wall.stretch.length() > 20.0).count();
-        assert!(long <= 1, "only the best line so far is kept at the limit");
-    }
-
-    #[test]
     fn too_few_points_have_no_walls() {
         for count in 0..12 {
             let points: Vec<Point2> = line_of_points(5.0, 5.0, 0.4, count).collect();

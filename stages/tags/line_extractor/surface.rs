@@ -50,13 +50,6 @@ mod tests {
     }
 
     #[test]
-    fn a_solid_keeps_its_surface() {
-        let block = kept(30, 30, |column, row| (10..20).contains(&column) && (10..20).contains(&row));
-        assert_eq!(block.len(), 100 - 6 * 6);
-        assert!(block.iter().all(|cell| !((12..18).contains(&cell.column) && (12..18).contains(&cell.row))));
-    }
-
-    #[test]
     fn a_map_that_is_occupied_all_over_has_no_surface() {
         assert_eq!(kept(40, 30, |_, _| true), []);
         assert_eq!(kept(0, 0, |_, _| true), []);

@@ -121,29 +121,6 @@ mod tests {
     }
 
     #[test]
-    fn walls_at_an_angle_do_not_turn_the_circular_mean() {
-        let mut walls: Vec<Segment> = (0..12).map(|i| wall(12.0 + 90.0 * f64::from(i), 4.0)).collect();
-        walls.extend([wall(40.0, 15.0), wall(35.0, 6.0)]);
-        let direction = map_direction(&walls, &QuadrantClassifierParameters::default());
-        assert!(error(&direction, 12.0) < 1e-6);
-        assert!((direction.agreement - 48.0 / 69.0).abs() < 1e-9);
-        let groups = map_direction(&walls, &modes()[1]);
-        assert!(error(&groups, 12.0) > 1.0, "the paper's mean takes all walls");
-    }
-
-    #[test]
-    fn a_round_hall_and_no_walls_have_no_direction() {
-        let hall: Vec<Segment> = (0..60).map(|i| wall(6.0 * f64::from(i), 1.0)).collect();
-        for parameters in modes() {
-            assert!(!map_direction(&hall, &parameters).valid);
-            assert_eq!(map_direction(&[], &parameters), Direction::default());
-            let broken = [Segment { x1: f64::NAN, ..wall(3.0, 1.0) }, wall(3.0, 0.0)];
-            assert_eq!(map_direction(&broken, &parameters), Direction::default());
-            assert!(!map_direction(&[wall(3.0, 1.5)], &parameters).valid, "one short wall is not enough");
-        }
-    }
-
-    #[test]
     fn the_direction_of_a_deformed_map_is_less_certain_than_its_scatter_but_no_less_than_one_wall() {
         let deformed = |degrees: f64, count: i32| -> Direction {
             let angle = |i: i32| 90.0 * f64::from(i % 4) + degrees * f64::from(i - count / 2) / f64::from(count);

@@ -76,32 +76,6 @@ mod tests {
     }
 
     #[test]
-    fn tables_1_and_2_are_reproduced() {
-        let table_1 = [2.0, 90.0, -1.0, -89.0, 179.0, 79.0].map(f64::to_radians);
-        let classified = classify(&table_1);
-        let degrees: Vec<f64> = classified.iter().map(|(_, angle)| angle.to_degrees()).collect();
-        for (actual, expected) in degrees.iter().zip([2.0, 90.0, -1.0, 91.0, -1.0, 79.0]) {
-            assert!((actual - expected).abs() < 1e-9, "{degrees:?}");
-        }
-        let of = |group| {
-            let members = classified.iter().filter(move |(of, _)| *of == group);
-            members.map(|(_, angle)| angle.to_degrees().round() as i32).collect::<Vec<_>>()
-        };
-        assert_eq!(of(Group::First), [2, -1, -1]);
-        assert_eq!(of(Group::Second), [90, 91, 79]);
-    }
-
-    #[test]
-    fn equation_4_is_the_weighted_mean_of_each_group() {
-        let groups =
-            group_directions(&walls(&[(2.0, 3.0), (90.0, 1.0), (-1.0, 1.0), (-89.0, 1.0), (179.0, 2.0), (79.0, 2.0)]));
-        let groups = groups.unwrap();
-        assert!((groups[0].to_degrees() - (2.0 * 3.0 - 1.0 - 2.0) / 6.0).abs() < 1e-9);
-        assert!((groups[1].to_degrees() - (90.0 + 91.0 + 2.0 * 79.0) / 4.0).abs() < 1e-9);
-        assert!((bisector(groups) - (groups[0] + groups[1]) / 2.0).abs() < 1e-12);
-    }
-
-    #[test]
     fn an_empty_group_is_at_a_right_angle_to_the_other() {
         let groups = group_directions(&walls(&[(10.0, 1.0), (-170.0, 1.0)])).unwrap();
         assert!((groups[0].to_degrees() - 10.0).abs() < 1e-9 && (groups[1].to_degrees() - 100.0).abs() < 1e-9);

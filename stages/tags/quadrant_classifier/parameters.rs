@@ -176,35 +176,3 @@ impl Default for QuadrantClassifierParameters {
 }
 
 impl Parameters for QuadrantClassifierParameters {}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_defaults_are_in_range() {
-        assert_eq!(QuadrantClassifierParameters::default().check(), []);
-    }
-
-    #[test]
-    fn every_value_out_of_range_is_reported() {
-        let parameters = QuadrantClassifierParameters {
-            tolerance: 0.0,
-            min_agreement: 1.1,
-            min_wall_length: -1.0,
-            end_deviation: 0.0,
-            wall_deviation: -0.1,
-            min_deviation: f64::NAN,
-            tag_deviation: f64::INFINITY,
-            max_tag_rotation_deviation: 1.0,
-            contradiction_angle: -0.1,
-            max_contradiction: 0.9,
-            max_confirming_angle: -0.1,
-            max_residual: 0.0,
-            resend_distance: -0.1,
-            resend_angle: f64::NAN,
-            ..Default::default()
-        };
-        assert_eq!(parameters.check().len(), 14);
-    }
-}

@@ -19,32 +19,6 @@ mod tests {
     use proptest::prelude::*;
     use std::f64::consts::TAU;
 
-    /// Equation 7, with quadrants of 90 degrees.
-    fn equation_7(theta_hat_degrees: f64) -> u8 {
-        match (theta_hat_degrees + 45.0).rem_euclid(360.0) - 45.0 {
-            v if v < 45.0 => 0,
-            v if v < 135.0 => 1,
-            v if v < 225.0 => 2,
-            _ => 3,
-        }
-    }
-
-    #[test]
-    fn without_a_difference_of_directions_it_is_the_table_of_equation_7() {
-        for border in [-45.0, 45.0, 135.0, 225.0, 315.0] {
-            for offset in [-44.9, -1.0, -1e-6, 1e-6, 1.0, 44.9] {
-                let theta_hat: f64 = border + offset;
-                assert_eq!(quadrant(theta_hat.to_radians(), 0.0), equation_7(theta_hat), "{theta_hat}");
-                assert_eq!(quadrant((theta_hat - 360.0).to_radians(), 0.0), equation_7(theta_hat), "{theta_hat}");
-            }
-        }
-        for (theta_hat, kappa) in
-            [(0.0, 0), (90.0, 1), (180.0, 2), (-180.0, 2), (270.0, 3), (-90.0, 3), (210.0, 2), (304.0, 3)]
-        {
-            assert_eq!(quadrant(f64::to_radians(theta_hat), 0.0), kappa, "{theta_hat}");
-        }
-    }
-
     proptest! {
         #[test]
         fn the_rotation_is_recovered_for_any_directions(

@@ -1,11 +1,10 @@
 //! The stage as a whole: messages in, messages out.
 
 use super::kind;
-use crate::shared::geometry::{Point2, Pose2, pose, turn_difference};
+use crate::shared::geometry::{Point2, Pose2, pose};
 use gridweave_runtime::message::LogTime;
-use gridweave_runtime::ros::{Alignment, CommonTag, CommonTags, Header, MapDirection, Segment, Segments};
+use gridweave_runtime::ros::{Alignment, CommonTag, CommonTags, Header, Segment, Segments};
 use gridweave_runtime::stage::{Context, InputWire, StageHarness};
-use std::f64::consts::TAU;
 
 struct Run(StageHarness);
 
@@ -56,48 +55,6 @@ fn common(transform_a_b: &Pose2) -> CommonTags {
     let tags = [(1.0, 0.0), (8.0, 2.0), (3.0, 5.0)].map(tag).to_vec();
     let (robot_a, robot_b) = ("robot1".into(), "robot2".into());
     CommonTags { robot_a, robot_b, tags, accepted: true, ..Default::default() }
-}
-
-#[test]
-fn maps_and_common_tags_give_an_alignment_which_every_new_map_sends_again() {
-    let mut run = Run::new("");
-    let truth = pose(4.0, -2.0, 2.5);
-    assert!(run.segments(&segments("robot1", 2.5)).is_empty());
-    let direction = run.0.take::<MapDirection>("direction").unwrap().remove(0);
-    assert!(direction.valid && turn_difference(direction.direction, 2.5, TAU / 4.0).abs() < 1e-9);
-
-    let first = run.common(&common(&truth));
-    assert_eq!(first.len(), 1);
-    assert_eq!(first[0].method, "tags");
-    assert!(run.common(&common(&truth)).is_empty(), "nothing has changed");
-
-    let second = run.segments(&segments("robot2", 0.0));
-    assert_eq!(second.len(), 1);
-    assert_eq!((second[0].method.as_str(), second[0].accepted), ("tags+directions", true));
-    assert_eq!((second[0].a.as_str(), second[0].b.as_str()), ("robot1", "robot2"));
-    assert_eq!(second[0].header.frame_id, "robot1/map");
-    assert_eq!(second[0].score, 0.9);
-    let error = second[0].transform_a_b() * truth.inverse();
-    assert!(error.translation.vector.norm() < 1e-6 && error.rotation.angle().abs() < 1e-9);
-    assert!(second[0].covariance.iter().all(|value| value.is_finite()) && second[0].has_transform);
-
-    assert_eq!(run.segments(&segments("robot2", 0.0)), second, "the refiner works on the map");
-    assert!(run.segments(&segments("robot3", 0.0)).is_empty(), "it is in no pair");
-    assert_eq!(run.common(&common(&pose(4.0, -1.9, 2.5))).len(), 1);
-    let directions = run.0.take::<MapDirection>("direction").unwrap();
-    assert!(directions.iter().any(|direction| direction.robot == "robot2" && direction.valid));
-}
-
-#[test]
-fn refused_tags_are_passed_on_with_their_reason() {
-    let mut run = Run::new("");
-    let refused = CommonTags { accepted: false, reason: "two tags only".into(), ..common(&pose(0.0, 0.0, 0.0)) };
-    let sent = run.common(&refused);
-    assert_eq!((sent[0].accepted, sent[0].reason.as_str()), (false, "two tags only"));
-    assert!(run.common(&refused).is_empty());
-    let together = CommonTags { tags: vec![refused.tags[0].clone(); 3], accepted: true, ..refused };
-    let sent = run.common(&together);
-    assert!(!sent[0].accepted && sent[0].reason.contains("do not determine the rotation"), "{}", sent[0].reason);
 }
 
 #[test]
@@ -155,12 +112,4 @@ fn a_single_tag_proposes_every_quarter_turn_if_it_may() {
     assert!(run.common(&one).is_empty(), "nothing has changed");
     let vague = CommonTags { tags: vec![CommonTag { certainty_a: 0.8, ..one.tags[0].clone() }], ..one.clone() };
     assert!(!run.common(&vague)[0].accepted);
-}
-
-#[test]
-fn a_robot_paired_with_itself_is_left_out_with_a_warning() {
-    let mut run = Run::new("");
-    let own = CommonTags { robot_b: "robot1".into(), ..common(&pose(0.0, 0.0, 0.0)) };
-    assert!(run.common(&own).is_empty());
-    assert_eq!(run.0.warnings().len(), 1);
 }

@@ -51,32 +51,6 @@ mod tests {
     }
 
     #[test]
-    fn table_3_is_sorted_as_in_the_paper() {
-        let robot_1 = [tag("5", 0.82), tag("7", 0.99), tag("9", 0.91)];
-        let robot_2 = [tag("5", 0.92), tag("7", 0.76), tag("9", 0.92)];
-        let common = common_tags(&robot_1, &robot_2, 0.75);
-        let order: Vec<&str> = common.iter().map(|tag| tag.tag_id.as_str()).collect();
-        let precision: Vec<f64> = common.iter().map(CommonTag::common_precision).collect();
-        assert_eq!(order, ["9", "5", "7"]);
-        assert_eq!(precision, [0.91, 0.82, 0.76]);
-    }
-
-    #[test]
-    fn a_tag_must_be_certain_in_both_maps() {
-        let common =
-            common_tags(&[tag("1", 0.75), tag("2", 0.9), tag("3", 0.9)], &[tag("1", 0.75), tag("2", 0.74)], 0.75);
-        assert_eq!(common.len(), 1);
-        assert_eq!(common[0].tag_id, "1");
-    }
-
-    #[test]
-    fn tags_of_equal_precision_come_by_id() {
-        let tags = ["c", "a", "b"].map(|id| tag(id, 0.9));
-        let order: Vec<String> = common_tags(&tags, &tags, 0.75).into_iter().map(|tag| tag.tag_id).collect();
-        assert_eq!(order, ["a", "b", "c"]);
-    }
-
-    #[test]
     fn estimates_that_are_not_finite_are_ignored() {
         let good = tag("1", 0.9);
         for bad in [

@@ -89,33 +89,3 @@ impl Parameters for TagFilterParameters {
         errors
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_defaults_are_in_range() {
-        assert_eq!(TagFilterParameters::default().check(), vec![]);
-    }
-
-    #[test]
-    fn every_value_out_of_range_is_named() {
-        let wrong = TagFilterParameters {
-            certainty: 1.1,
-            best_certainty: 0.5,
-            min_tags: 1,
-            gate: 0.0,
-            map_stddev: f64::NAN,
-            map_drift: -0.1,
-            min_agreement: -0.1,
-            max_chance: 0.0,
-            max_provisional_chance: 1.5,
-            max_yaw_stddev: f64::INFINITY,
-            max_rival_share: 2.0,
-            rival_distance: -1.0,
-            min_change: f64::NAN,
-        };
-        assert_eq!(wrong.check().len(), 13);
-    }
-}

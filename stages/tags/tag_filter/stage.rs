@@ -167,41 +167,4 @@ mod tests {
         assert_eq!(provisional(&bench.send("robot2", &tags()[..2])), [(true, true)]);
         assert_eq!(provisional(&bench.send("robot2", &tags()[..3])), [(true, false)]);
     }
-
-    #[test]
-    fn a_small_change_is_sent_at_the_end() {
-        let mut bench = Bench::new();
-        bench.send("robot1", &tags());
-        bench.send("robot2", &tags());
-        let mut moved = tags();
-        moved[0].x += 0.01;
-        assert_eq!(bench.send("robot2", &moved), vec![]);
-        moved[1].x += 0.03;
-        assert_eq!(bench.send("robot2", &moved).len(), 1);
-        moved[0].x += 0.01;
-        assert_eq!(bench.send("robot2", &moved), vec![]);
-        for count in [1, 0] {
-            bench.0.finish(LogTime(2)).unwrap();
-            assert_eq!(bench.0.take_messages("common").len(), count);
-        }
-    }
-
-    #[test]
-    fn a_pair_without_a_common_tag_is_sent_as_refused() {
-        let mut bench = Bench::new();
-        bench.send("robot1", &tags());
-        let sent = bench.send("robot2", &[]);
-        assert_eq!((sent.len(), sent[0].accepted), (1, false));
-        assert_eq!(sent[0].reason, "robot1 and robot2 have no tag in common; robot1 has located 4 tags, robot2 0");
-    }
-
-    #[test]
-    fn estimates_that_cannot_be_used_are_counted_and_left_out() {
-        let mut bench = Bench::new();
-        let mut broken = tags();
-        broken[0].x = f64::NAN;
-        bench.send("robot1", &broken);
-        bench.send("", &tags());
-        assert_eq!(bench.0.warnings().values().sum::<u64>(), 2, "{:?}", bench.0.warnings());
-    }
 }

@@ -159,61 +159,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_defaults_are_in_range() {
-        assert_eq!(TagLocalizerParameters::default().check(), vec![]);
-    }
-
-    #[test]
     fn the_paper_has_300_cells_and_a_window_of_3() {
         let paper = TagLocalizerParameters { grid_size: 6.0, ..Default::default() };
         assert_eq!((paper.cells(), paper.window_cells(0.05)), (300, 3));
         assert_eq!((paper.window_cells(0.0), paper.window_cells(0.5), paper.window_cells(1e9)), (3, 30, 300));
         assert_eq!(paper.check(), vec![]);
-    }
-
-    #[test]
-    fn every_value_out_of_range_is_named() {
-        let wrong = TagLocalizerParameters {
-            grid_size: f64::NAN,
-            resolution: 0.0,
-            window: -1.0,
-            window_deviations: f64::NAN,
-            reach: f64::INFINITY,
-            range_stddev: 0.0,
-            pose_stddev: -0.1,
-            min_travel: f64::NAN,
-            outlier_share: 0.6,
-            offset_stddev: -1.0,
-            scale_stddev: f64::NAN,
-            sighting_stddev: 0.0,
-            bearing_stddev: -0.1,
-            heading_stddev: f64::NAN,
-            position_stddev: -1.0,
-            timeout: 0.0,
-            max_pose_age: -1.0,
-            ..Default::default()
-        };
-        let fields: Vec<_> = wrong.check().into_iter().map(|error| error.field).collect();
-        for field in [
-            "grid_size",
-            "resolution",
-            "window",
-            "window_deviations",
-            "reach",
-            "range_stddev",
-            "pose_stddev",
-            "min_travel",
-            "outlier_share",
-            "offset_stddev",
-            "scale_stddev",
-            "sighting_stddev",
-            "bearing_stddev",
-            "heading_stddev",
-            "position_stddev",
-            "timeout",
-            "max_pose_age",
-        ] {
-            assert!(fields.iter().any(|wrong| wrong == field), "{field}");
-        }
     }
 }

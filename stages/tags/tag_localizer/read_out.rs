@@ -201,39 +201,6 @@ mod tests {
     }
 
     #[test]
-    fn a_round_drive_makes_a_tag_certain() {
-        let tag = Point2::new(0.71, 1.93);
-        let mode = read_out(&posterior(tag, round_drive()), Readout::Window, 3).unwrap();
-        assert!(mode.certainty > 0.95, "{mode:?}");
-        assert!((mode.position - tag).norm() < 0.002, "{mode:?}");
-        assert!((mode.window - tag).amax() < 0.011, "half a cell at most: {mode:?}");
-    }
-
-    #[test]
-    fn a_straight_drive_leaves_a_certainty_of_one_half() {
-        let tag = Point2::new(0.3, 1.5);
-        let drive = (0..200).map(|step| (-1.5 + 0.015 * f64::from(step), 0.0));
-        let mode = read_out(&posterior(tag, drive), Readout::Window, 3).unwrap();
-        assert!(mode.certainty > 0.45 && mode.certainty < 0.501, "{mode:?}");
-        assert!((mode.mass - 0.5).abs() < 1e-3, "{mode:?}");
-        let mirrored = Point2::new(tag.x, -tag.y);
-        assert!((mode.position - tag).norm().min((mode.position - mirrored).norm()) < 0.002, "{mode:?}");
-        assert!(mode.covariance.trace().sqrt() < 0.03, "the mirror image does not widen the mode: {mode:?}");
-    }
-
-    #[test]
-    fn blocks_halve_the_certainty_of_a_tag_on_their_border() {
-        // Blocks of 3 cells of 0.02 m begin at -3 m, so there is a border at 0.
-        let (border, middle) = (Point2::new(0.0, 1.53), Point2::new(0.03, 1.53));
-        let certainty = |tag, readout| read_out(&posterior(tag, round_drive()), readout, 3).unwrap().certainty;
-        assert!((certainty(border, Readout::Blocks) - 0.5).abs() < 0.03);
-        assert!(certainty(middle, Readout::Blocks) > 0.95);
-        let block = read_out(&posterior(middle, round_drive()), Readout::Blocks, 3).unwrap().window;
-        assert!((block - Point2::new(0.03, 1.53)).norm() < 1e-9, "{block}");
-        assert!(certainty(border, Readout::Window) > 0.9);
-    }
-
-    #[test]
     fn the_covariance_is_that_of_the_readings() {
         // Half of the 100 readings count along each axis: 0.05 m / sqrt(50).
         let mode = read_out(&posterior(Point2::new(0.0, 0.0), round_drive()), Readout::Window, 3).unwrap();

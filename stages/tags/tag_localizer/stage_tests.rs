@@ -68,27 +68,6 @@ fn at(seconds: f64) -> LogTime {
 }
 
 #[test]
-fn all_tags_are_sent_when_one_is_out_of_reach() {
-    let mut bench = Bench::new("");
-    bench.drive(&[("far", 0.3, 2.0), ("near", 0.0, 0.1)], 0.0);
-    assert_eq!(bench.take(), vec![], "both are in reach");
-    bench.pose(22.0, 0.0, 0.0);
-    let sent = bench.take();
-    assert_eq!(sent.len(), 1);
-    assert_eq!((sent[0].robot.as_str(), sent[0].header.frame_id.as_str()), ("robot1", "robot1/map"));
-    assert_eq!(LogTime::from(sent[0].header.stamp), at(22.0));
-    assert_eq!(sent[0].tags.len(), 2);
-    assert!(sent[0].tags[0].certainty >= sent[0].tags[1].certainty);
-    for tag in &sent[0].tags {
-        let truth = if tag.tag_id == "far" { (0.3, 2.0) } else { (0.0, 0.1) };
-        assert!((tag.x - truth.0).hypot(tag.y - truth.1) < 0.01, "{tag:?}");
-        assert!(tag.certainty > 0.9 && tag.readings == 200, "{tag:?}");
-    }
-    bench.finish();
-    assert_eq!(bench.take(), vec![], "nothing has changed since");
-}
-
-#[test]
 fn a_tag_that_is_read_again_goes_on_gathering_readings() {
     let mut bench = Bench::new("");
     bench.drive(&[("tag", 0.3, 2.0)], 0.0);
@@ -131,51 +110,6 @@ fn a_robot_without_tags_is_reported_at_the_end() {
     bench.finish();
     let sent = bench.take();
     assert_eq!((sent.len(), sent[0].tags.len(), sent[0].robot.as_str()), (1, 0, "robot1"));
-}
-
-#[test]
-fn a_tag_with_few_readings_is_not_reported() {
-    let mut bench = Bench::new("min_readings = 4");
-    bench.pose(0.0, 0.0, 0.0);
-    for _ in 0..3 {
-        bench.reading(0.1, "few", 1.0);
-    }
-    for _ in 0..4 {
-        bench.reading(0.1, "enough", 1.0);
-    }
-    bench.finish();
-    let ids: Vec<String> = bench.take().remove(0).tags.into_iter().map(|tag| tag.tag_id).collect();
-    assert_eq!(ids, ["enough"]);
-}
-
-#[test]
-fn readings_that_cannot_be_used_are_counted_and_left_out() {
-    let mut bench = Bench::new("min_readings = 1");
-    bench.reading(0.0, "tag", 1.0);
-    bench.pose(1.0, 0.0, 0.0);
-    for range in [f64::NAN, f64::INFINITY, -1.0, 0.0] {
-        bench.reading(1.0, "tag", range);
-    }
-    bench.reading(1.0, "", 1.0);
-    bench.reading(1.0, "tag", 3.3);
-    bench.pose(2.0, f64::NAN, 0.0);
-    bench.reading(9.0, "tag", 1.0);
-    bench.finish();
-    assert_eq!(bench.take()[0].tags, vec![]);
-    let warnings = bench.warnings();
-    let several: Vec<_> = warnings.iter().filter(|(_, count)| *count > 1).collect();
-    assert!(matches!(&several[..], [(text, 4)] if text.contains("not positive")), "{warnings:?}");
-    assert_eq!(warnings.len(), 6, "{warnings:?}");
-}
-
-#[test]
-fn poses_in_another_frame_are_left_out() {
-    let mut bench = Bench::new("min_readings = 1");
-    bench.pose(0.0, 0.0, 0.0);
-    let odometry = PoseWithCovarianceStamped { header: Header::new(at(0.1), "odom"), ..Default::default() };
-    bench.send_pose(&odometry);
-    assert_eq!(bench.warnings().len(), 1);
-    assert!(bench.warnings()[0].0.contains("`odom`"), "{:?}", bench.warnings());
 }
 
 #[test]

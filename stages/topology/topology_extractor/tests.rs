@@ -3,9 +3,6 @@
 use super::*;
 use crate::shared::geometry::{Grid, GridGeometry, Point2, UNKNOWN, pose};
 use crate::shared::test_world::floor_plan::{FloorPlan, drawing, seen};
-use gridweave_runtime::message::LogTime;
-use gridweave_runtime::ros::{MapMetaData, OccupancyGrid, TopologicalMap};
-use gridweave_runtime::stage::{Parameters, StageHarness};
 
 fn office(yaw: f64) -> (Topology, Vec<Point2>) {
     let map = FloorPlan::office().draw(seen(-0.5, -0.5, 20.5, 12.5), drawing(3.0, 4.0, yaw));
@@ -77,25 +74,4 @@ fn small_pieces_are_left_out() {
         extract(&Grid::new(geometry, &cells).unwrap(), &parameters).nodes.len()
     };
     assert_eq!((nodes(0.5), nodes(2.0), nodes(10.0)), (3, 2, 0));
-}
-
-#[test]
-fn every_map_gets_an_answer_and_a_wrong_one_a_warning() {
-    let mut stage = StageHarness::new(&kind(), "").unwrap();
-    let info = MapMetaData { resolution: 0.05, width: 2, height: 1, ..Default::default() };
-    for data in [&[0, 0][..], &[255, 255], &[0]] {
-        let map = OccupancyGrid { info, data, ..Default::default() };
-        stage.give::<OccupancyGrid<'_>>("map", "robot1", LogTime(1), &map).unwrap();
-    }
-    let sent: Vec<TopologicalMap> = stage.take("topology").unwrap();
-    assert_eq!(sent.len(), 2);
-    assert!(sent.iter().all(|map| map.robot == "robot1" && map.nodes.is_empty() && map.paths.is_empty()));
-    assert_eq!(stage.warnings().len(), 1);
-}
-
-#[test]
-fn the_defaults_are_in_range_and_nonsense_is_not() {
-    assert!(TopologyExtractorParameters::default().check().is_empty());
-    let wrong = TopologyExtractorParameters { min_spur: f64::NAN, door_widening: 0.5, ..Default::default() };
-    assert_eq!(wrong.check().len(), 2);
 }

@@ -16,21 +16,6 @@ fn a_provisional_alignment_is_left_out() {
 }
 
 #[test]
-fn the_reference_is_exactly_at_the_origin() {
-    let mut run = Run::new(None);
-    run.map("robot1", "map");
-    let robot1 = RobotFrame { robot: "robot1".into(), frame_id: "robot1/map".into(), ..Default::default() };
-    let expected = RobotFrames {
-        header: Header::new(LogTime(5), "world"),
-        reference: "robot1".into(),
-        frames: vec![robot1],
-        ..Default::default()
-    };
-    assert_eq!(run.solved(), expected);
-    assert!(run.stage.take_messages("verdicts").is_empty(), "there is no pair");
-}
-
-#[test]
 fn a_robot_without_a_map_is_in_the_frame_of_its_tags() {
     let mut run = Run::new(None);
     run.tags("robot1", "robot1/odom");
@@ -42,17 +27,6 @@ fn a_robot_without_a_map_is_in_the_frame_of_its_tags() {
     assert_eq!(frame_ids(run.solved()), ["robot1/odom", "robot2/map"]);
     run.tags("robot1", "odom_combined");
     assert_eq!(frame_ids(run.solved()), ["robot1/odom_combined", "robot2/map"]);
-}
-
-#[test]
-fn another_reference_turns_the_frames_round() {
-    let mut run = Run::new(Some("robot2"));
-    run.map("robot1", "map");
-    assert!(run.frames().is_empty(), "without the reference there is no world");
-    run.map("robot2", "map");
-    run.align(&between(1, 2));
-    assert!(is_near(&run.pose_of("robot1").unwrap(), &(place(2).inverse() * place(1)), 1e-9));
-    assert_eq!(run.latest().unwrap().reference, "robot2");
 }
 
 #[test]
@@ -110,55 +84,6 @@ fn a_log_without_robots_has_no_frames() {
     run.finish().unwrap();
     assert!(run.frames().is_empty());
     assert!(run.stage.take_messages("verdicts").is_empty());
-}
-
-#[test]
-fn frames_are_sent_when_something_changes_and_only_then() {
-    let mut run = Run::new(None);
-    run.map("robot1", "robot1/map");
-    assert_eq!(run.frames().len(), 1);
-    run.map("robot1", "robot1/map");
-    assert_eq!(run.frames().len(), 0, "a later map of a known robot");
-    run.map("robot2", "robot2/map");
-    assert_eq!(run.frames().len(), 1, "another robot");
-    run.align(&refused("robot1", "robot2", 0.1, "two tags in common"));
-    assert_eq!(run.frames().len(), 1, "another reason");
-    run.align(&between(1, 2));
-    assert_eq!(run.frames().len(), 1, "a pose");
-    let mut nearly = between(1, 2);
-    run.align(&nearly);
-    nearly.x += 0.01;
-    run.align(&nearly);
-    assert_eq!(run.frames().len(), 0, "a pose that the alignments hardly fit better");
-    run.finish().unwrap();
-    assert!((run.frames()[0].frames[1].x - nearly.x).abs() < 1e-9, "at the end it is as solved");
-    run.finish().unwrap();
-    assert!(run.frames().is_empty());
-}
-
-#[test]
-fn transforms_lead_from_the_world_to_frames_with_the_robots_name() {
-    let mut run = Run::new(None);
-    run.map("robot1", "/robot1/map");
-    run.map("robot2", "map");
-    run.map("robot3", "");
-    run.align(&between(1, 2));
-    run.align(&between(2, 3));
-    let last = run.stage.take_messages("tf").pop().unwrap();
-    assert_eq!(last.header().topic.as_str(), "/tf_static");
-    let transforms = last.decode::<TFMessage>().unwrap().transforms;
-    let names: Vec<&str> = transforms.iter().map(|transform| transform.child_frame_id.as_str()).collect();
-    assert_eq!(names, ["robot1/map", "robot2/map", "robot3/map"]);
-    assert!(transforms.iter().all(|transform| transform.header.frame_id == "world"));
-    assert!(is_near(&transforms[2].transform.planar(), &place(3), 1e-9));
-}
-
-#[test]
-fn a_robot_without_alignments_has_a_reason() {
-    let mut run = Run::new(None);
-    run.map("robot1", "map");
-    run.map("robot2", "map");
-    assert!(run.reason("robot2").starts_with("no alignment with any robot was found"), "{}", run.reason("robot2"));
 }
 
 #[test]
@@ -253,28 +178,6 @@ fn the_most_informative_refusal_is_the_reason() {
 }
 
 #[test]
-fn robots_connected_with_each_other_but_not_with_the_reference_have_a_reason() {
-    let mut run = Run::new(None);
-    run.map("robot1", "map");
-    run.align(&between(2, 3));
-    run.align(&refused("robot1", "robot3", 0.2, "no tags in common"));
-    let expected =
-        "it is connected with robot3 only, not with the reference: no alignment with robot1: no tags in common";
-    assert_eq!(run.reason("robot2"), expected);
-}
-
-#[test]
-fn a_verdict_contains_the_reason_of_the_alignment() {
-    let mut run = Run::new(None);
-    let refusal = refused("robot1", "robot3", 0.2, "no tags in common");
-    [between(1, 2), refusal.clone()].iter().for_each(|alignment| run.align(alignment));
-    run.align(&Alignment { header: Header::new(LogTime(5), "robot1/map"), ..between(1, 2) });
-    let unchecked = |alignment| Verdict { alignment, checked: false };
-    assert_eq!(run.verdicts(), [unchecked(between(1, 2)), unchecked(refusal)]);
-    assert_eq!(run.verdicts.unwrap().header, Header::new(LogTime(5), "world"));
-}
-
-#[test]
 fn the_verdicts_on_many_pairs_are_not_sent_for_each_robot() {
     let mut run = Run::new(Some("robot1"));
     let (robots, mut sent) = (100, 0);
@@ -332,22 +235,6 @@ fn covariances_are_sent_as_solved_at_the_end() {
     run.finish().unwrap();
     let last = run.frames().pop().unwrap();
     assert!(last.frames[1].covariance[0] > before.frames[1].covariance[0]);
-}
-
-#[test]
-fn an_invalid_alignment_is_left_out_with_a_reason() {
-    let mut run = Run::new(None);
-    run.map("robot1", "map");
-    for (x, variance) in [(f64::NAN, 1.0), (f64::INFINITY, 1.0), (1e300, 1.0), (0.0, f64::NAN), (0.0, -5.0)] {
-        let mut alignment = between(1, 2);
-        (alignment.x, alignment.covariance[0]) = (x, variance);
-        run.align(&alignment);
-        assert!(run.pose_of("robot2").is_none());
-        assert!(run.reason("robot2").contains("its "), "{}", run.reason("robot2"));
-    }
-    run.align(&accepted("robot1", "robot1", pose(1.0, 0.0, 0.0)));
-    run.map("", "map");
-    assert_eq!(run.stage.warnings().values().sum::<u64>(), 2);
 }
 
 #[test]

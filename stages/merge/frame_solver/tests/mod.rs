@@ -8,8 +8,8 @@ use super::kind;
 use crate::shared::geometry::{Pose2, pose, wrap_angle};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{
-    Alignment, Header, MapMetaData, OccupancyGrid, RobotFrame, RobotFrames, TFMessage, TagEstimates, UnmergedRobot,
-    Verdict, Verdicts,
+    Alignment, Header, MapMetaData, OccupancyGrid, RobotFrames, TFMessage, TagEstimates, UnmergedRobot, Verdict,
+    Verdicts,
 };
 use gridweave_runtime::stage::{Context, InitialPose, InputWire, StageError, StageHarness};
 

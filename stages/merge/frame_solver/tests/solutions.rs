@@ -9,49 +9,6 @@ use crate::merge::frame_solver::uncertain::error_vector;
 use proptest::prelude::*;
 
 #[test]
-fn a_later_alignment_replaces_the_earlier_one() {
-    let mut run = Run::new(None);
-    run.align(&accepted("robot1", "robot2", pose(9.0, 9.0, 1.0)));
-    run.align(&between(1, 2));
-    assert!(is_near(&run.pose_of("robot2").unwrap(), &place(2), 1e-9));
-    run.align(&refused("robot1", "robot2", 0.3, "the larger maps disagree"));
-    assert_eq!(run.reason("robot2"), "no alignment with robot1: the larger maps disagree");
-}
-
-#[test]
-fn a_contradiction_that_cannot_be_decided_leaves_its_robots_out() {
-    let mut run = Run::new(None);
-    let mut wrong = between(2, 3);
-    wrong.x += 3.0;
-    [between(1, 2), between(1, 3), wrong, between(3, 4)].iter().for_each(|alignment| run.align(alignment));
-    assert_eq!(run.latest().unwrap().frames.len(), 1);
-    assert!(run.reason("robot2").contains("the others do not decide which is wrong"), "{}", run.reason("robot2"));
-    assert!(run.reason("robot4").contains("it is connected with robot3 only"), "{}", run.reason("robot4"));
-    let accepted: Vec<bool> = run.verdicts().iter().map(|verdict| verdict.alignment.accepted).collect();
-    assert_eq!(accepted, [false, false, false, true]);
-}
-
-#[test]
-fn a_wrong_alignment_is_left_out_when_the_others_agree() {
-    let mut run = Run::new(None);
-    for a in 1..=4 {
-        (a + 1..=4).for_each(|b| run.align(&between(a, b)));
-    }
-    let mut wrong = between(1, 3);
-    wrong.yaw += 1.5;
-    run.align(&wrong);
-    for robot in 2..=4 {
-        assert!(is_near(&run.pose_of(&format!("robot{robot}")).unwrap(), &place(robot), 1e-6));
-    }
-    let (left_out, others): (Vec<Verdict>, Vec<Verdict>) =
-        run.verdicts().into_iter().partition(|verdict| !verdict.alignment.accepted);
-    assert_eq!((left_out.len(), others.len()), (1, 5));
-    let left_out = &left_out[0].alignment;
-    assert_eq!((left_out.a.as_str(), left_out.b.as_str(), left_out.yaw), ("robot1", "robot3", wrong.yaw));
-    assert!(left_out.reason.contains("contradicts"), "{}", left_out.reason);
-}
-
-#[test]
 fn a_certain_alignment_counts_for_more() {
     let mut run = Run::new(None);
     run.align(&between(1, 2));
@@ -61,62 +18,6 @@ fn a_certain_alignment_counts_for_more() {
     vague.covariance = std::array::from_fn(|index| if index % 4 == 0 { 1.0 } else { 0.0 });
     run.align(&vague);
     assert!(is_near(&run.pose_of("robot3").unwrap(), &place(3), 0.02));
-}
-
-#[test]
-fn robots_that_were_sent_stay_until_the_alignments_fit_much_better() {
-    let mut run = Run::new(None);
-    run.align(&between(1, 2));
-    let sent = run.frames().pop().unwrap().frames[1].clone();
-    run.align(&near(1, 2, 0.01));
-    assert!(run.frames().is_empty());
-    run.align(&between(2, 3));
-    let with_another = run.frames().pop().unwrap();
-    assert_eq!(
-        (with_another.frames[1].x, with_another.frames[1].yaw),
-        (sent.x, sent.yaw),
-        "another robot is no reason"
-    );
-    assert_eq!(with_another.frames.len(), 3);
-    run.align(&near(1, 2, 0.3));
-    let moved = run.frames().pop().unwrap();
-    assert!((moved.frames[1].x - sent.x - 0.3).abs() < 1e-9);
-    run.align(&near(1, 2, 0.31));
-    assert!(run.frames().is_empty());
-    run.finish().unwrap();
-    let last = run.frames().pop().unwrap();
-    assert!((last.frames[1].x - sent.x - 0.31).abs() < 1e-9, "the best is sent at the end");
-}
-
-#[test]
-fn robots_connected_with_each_other_only_are_placed_in_a_frame_of_their_own() {
-    let mut run = Run::new(None);
-    (1..=6).for_each(|robot| run.map(&format!("robot{robot}"), "map"));
-    run.align(&between(4, 5));
-    run.align(&between(3, 4));
-    let message = run.frames().pop().unwrap();
-    assert_eq!(message.frames.len(), 1);
-    assert_eq!(message.unmerged.len(), 5);
-    assert_eq!(message.groups.len(), 1);
-    let group = &message.groups[0];
-    assert_eq!(group.reference, "robot4", "the reference stays when another robot joins");
-    let robots: Vec<&str> = group.frames.iter().map(|frame| frame.robot.as_str()).collect();
-    assert_eq!((group.frame_id.as_str(), robots), ("world/robot4", vec!["robot3", "robot4", "robot5"]));
-    for (frame, robot) in group.frames.iter().zip(3..) {
-        assert!(is_near(&frame.transform_reference_robot(), &(place(4).inverse() * place(robot)), 1e-9));
-    }
-    run.align(&between(1, 5));
-    assert!(run.latest().unwrap().groups.is_empty());
-    assert!(is_near(&run.pose_of("robot3").unwrap(), &place(3), 1e-9));
-}
-
-#[test]
-fn an_alignment_in_no_cycle_is_not_checked() {
-    let mut run = Run::new(None);
-    [between(1, 2), between(1, 3), between(2, 3), between(3, 4)].iter().for_each(|alignment| run.align(alignment));
-    run.align(&refused("robot1", "robot4", 0.0, "no tags in common"));
-    let checked: Vec<bool> = run.verdicts().iter().map(|verdict| verdict.checked).collect();
-    assert_eq!(checked, [true, true, false, true, false]);
 }
 
 #[test]

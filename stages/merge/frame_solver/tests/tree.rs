@@ -42,50 +42,6 @@ impl Buffer {
 }
 
 #[test]
-fn the_robots_of_a_group_that_meets_the_reference_have_never_been_elsewhere() {
-    let (mut run, mut buffer) = (Run::new(None), Buffer::default());
-    (1..=4).for_each(|robot| run.map(&format!("robot{robot}"), "map"));
-    run.align(&between(3, 4));
-    buffer.listen(&mut run);
-    assert!(!buffer.edges.keys().any(|frame| frame.starts_with("robot")), "nothing is certain");
-    run.align(&between(1, 2));
-    buffer.listen(&mut run);
-    buffer.assert_at("robot2/map", "world", &place(2));
-    assert_eq!(buffer.root("robot4/map").0, "robot4/map", "it may still be connected with the reference");
-    run.align(&between(2, 3));
-    buffer.listen(&mut run);
-    run.finish().unwrap();
-    buffer.listen(&mut run);
-    (1..=4).for_each(|robot| buffer.assert_at(&format!("robot{robot}/map"), "world", &place(robot)));
-}
-
-#[test]
-fn the_world_is_known_from_the_first_map_on() {
-    let (mut run, mut buffer) = (Run::new(None), Buffer::default());
-    run.map("robot2", "map");
-    buffer.listen(&mut run);
-    buffer.assert_at("world_origin", "world", &place(1));
-    assert_eq!(buffer.edges.len(), 1, "it is not certain which robot is the reference");
-    run.map("robot1", "map");
-    assert!(run.stage.take::<TFMessage>("tf").unwrap().is_empty(), "it is known");
-}
-
-#[test]
-fn a_group_that_stays_apart_is_sent_at_the_end_in_a_tree_of_its_own() {
-    let (mut run, mut buffer) = (Run::new(None), Buffer::default());
-    (1..=4).for_each(|robot| run.map(&format!("robot{robot}"), "map"));
-    run.align(&between(3, 4));
-    run.finish().unwrap();
-    buffer.listen(&mut run);
-    buffer.assert_at("robot1/map", "world", &place(1));
-    assert_eq!(buffer.root("robot2/map").0, "robot2/map");
-    buffer.assert_at("robot3/map", "world/robot3", &place(1));
-    buffer.assert_at("robot4/map", "world/robot3", &(place(3).inverse() * place(4)));
-    run.finish().unwrap();
-    assert!(run.stage.take::<TFMessage>("tf").unwrap().is_empty(), "nothing has changed");
-}
-
-#[test]
 fn a_robot_that_is_the_reference_for_a_while_only_is_not_in_the_world() {
     let (mut run, mut buffer) = (Run::new(None), Buffer::default());
     run.map("robot2", "map");
@@ -94,15 +50,6 @@ fn a_robot_that_is_the_reference_for_a_while_only_is_not_in_the_world() {
     buffer.listen(&mut run);
     buffer.assert_at("robot1/map", "world", &place(1));
     assert_eq!(buffer.root("robot2/map").0, "robot2/map");
-}
-
-#[test]
-fn the_reference_that_the_pipeline_names_is_in_the_world_at_once() {
-    let (mut run, mut buffer) = (Run::new(Some("robot2")), Buffer::default());
-    run.map("robot1", "map");
-    run.map("robot2", "map");
-    buffer.listen(&mut run);
-    buffer.assert_at("robot2/map", "world", &place(1));
 }
 
 #[test]

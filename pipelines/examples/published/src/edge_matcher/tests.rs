@@ -2,9 +2,7 @@
 
 use super::*;
 use crate::pgvd_extractor::{PgvdExtractorParameters, topological_map};
-use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Alignment, Point, TopologicalMap, TopologicalNode, TopologicalPath};
-use gridweave_runtime::stage::{Parameters, StageHarness};
 use gridweave_stages::shared::geometry::{Grid, Point2, Pose2, pose, row_by_row};
 use gridweave_stages::shared::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
 use nalgebra::{Matrix3, UnitComplex, Vector2, Vector3};
@@ -172,63 +170,4 @@ fn the_diagrams_of_two_maps_of_one_office_are_matched_to_some_cells() {
     assert!(metres < 0.15, "{metres} m, {found:?}");
     let deviation = found.covariance[(0, 0)].sqrt();
     assert!(found.covariance.symmetric_eigenvalues().iter().all(|variance| *variance > 0.0) && deviation < 0.5);
-}
-
-fn rotation(yaw: f64, accepted: bool) -> Alignment {
-    let covariance = row_by_row(&Matrix3::from_diagonal(&Vector3::new(9.0, 9.0, 1e-4)));
-    let (a, b, reason) = ("robot1".to_owned(), "robot2".to_owned(), "by some means".to_owned());
-    // The translation of the message is wrong.
-    let (x, y) = (100.0, 100.0);
-    Alignment { a, b, x, y, yaw, covariance, accepted, reason, method: "radon".into(), ..Default::default() }
-}
-
-#[test]
-fn the_stage_matches_a_pair_when_its_rotation_has_come() {
-    let [west, east] = offices();
-    let truth = west.transform_to(&east);
-    let mut stage = StageHarness::new(&kind(), "").unwrap();
-    let mut time = 0;
-    let mut give = |stage: &mut StageHarness, map: Option<&TopologicalMap>, alignment: Option<&Alignment>| {
-        time += 1;
-        if let Some(map) = map {
-            stage.give::<TopologicalMap>("topological_map", &map.robot, LogTime(time), map).unwrap();
-        }
-        if let Some(alignment) = alignment {
-            stage.give::<Alignment>("alignment", "", LogTime(time), alignment).unwrap();
-        }
-        stage.take::<Alignment>("alignment").unwrap()
-    };
-    let turned = rotation(truth.rotation.angle(), true);
-    assert_eq!(give(&mut stage, Some(&diagram("robot1", &west)), Some(&turned)), [], "one map is missing");
-    assert_eq!(give(&mut stage, Some(&diagram("robot2", &east)), None), [], "the rotation may follow");
-    let sent = give(&mut stage, None, Some(&turned));
-    assert!(sent[0].accepted && sent[0].has_transform && sent[0].score > 0.0, "{sent:?}");
-    assert_eq!((sent[0].method.as_str(), sent[0].yaw), ("radon+edges", turned.yaw));
-    assert!(sent[0].reason.contains("agree on the translation") && sent[0].reason.ends_with("by some means"));
-    assert!(apart(&sent[0].transform_a_b(), &truth, &east).0 < 0.15);
-
-    let sent = give(&mut stage, None, Some(&rotation(0.0, false)));
-    assert!(!sent[0].accepted && sent[0].reason == "by some means", "{sent:?}");
-    assert_eq!(give(&mut stage, None, Some(&rotation(f64::NAN, true))), []);
-    give(&mut stage, None, Some(&turned));
-    give(&mut stage, Some(&TopologicalMap { robot: "robot2".into(), ..Default::default() }), None);
-    stage.finish(LogTime(99)).unwrap();
-    let sent = stage.take::<Alignment>("alignment").unwrap();
-    assert!(!sent[0].accepted && sent[0].reason.contains("0 edges"), "the last map counts: {sent:?}");
-}
-
-#[test]
-fn a_pair_that_waits_for_a_map_to_the_end_is_refused() {
-    let mut stage = StageHarness::new(&kind(), "").unwrap();
-    stage.give::<Alignment>("alignment", "", LogTime(1), &rotation(0.0, true)).unwrap();
-    stage.finish(LogTime(2)).unwrap();
-    let sent = stage.take::<Alignment>("alignment").unwrap();
-    assert_eq!(sent[0].reason, "no topological map of robot1 and robot2 has come");
-}
-
-#[test]
-fn parameters_out_of_range_are_refused() {
-    assert!(EdgeMatcherParameters::default().check().is_empty());
-    let wrong = EdgeMatcherParameters { min_edges: 0, vote_radius: 0.0, ..Default::default() };
-    assert_eq!(wrong.check().len(), 2);
 }

@@ -3,7 +3,6 @@
 use super::*;
 use gridweave_stages::shared::geometry::{Grid, GridGeometry, pose, turn_difference};
 use gridweave_stages::shared::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, seen};
-use gridweave_stages::shared::test_world::stage_bench::StageBench;
 use nalgebra::UnitComplex;
 use proptest::prelude::*;
 use std::f64::consts::PI;
@@ -119,17 +118,6 @@ fn the_covariance_is_that_of_the_place_in_the_middle_of_the_map() {
 }
 
 #[test]
-fn a_hall_fits_both_ways_round() {
-    let hall = FloorPlan::hall();
-    let a = hall.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(3.0, 2.0, 0.4));
-    let b = hall.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
-    let found = align(&a, &b);
-    assert!((found[0].index.omega() - found[1].index.omega()).abs() < 0.02, "{found:?}");
-    let turn = found[0].transform_a_b.rotation.angle_to(&found[1].transform_a_b.rotation);
-    assert!((turn.abs() - PI).abs() < 1e-9);
-}
-
-#[test]
 fn maps_without_walls_and_too_large_ones_are_refused_and_a_single_cell_fits_anywhere() {
     let office = FloorPlan::office().draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(3.0, 2.0, 0.4));
     let geometry = GridGeometry { width: 10, height: 10, resolution: 0.05, origin: pose(1e6, -1e6, 0.3) };
@@ -148,59 +136,4 @@ fn maps_without_walls_and_too_large_ones_are_refused_and_a_single_cell_fits_anyw
     let small = HoughSpectrumParameters { max_extent: 15.0, ..parameters };
     let refusal = align_spectra(&office, &one_cell, &small).unwrap_err();
     assert!(refusal.to_string().contains("longer than 15 m"), "{refusal}");
-}
-
-#[test]
-fn the_stage_aligns_every_pair_at_the_end_and_ranks_what_it_has_found() {
-    let office = FloorPlan::office();
-    let draw = |yaw| office.draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(12.0, 6.0, yaw));
-    let (a, b, c) = (draw(0.0), draw(0.4), draw(2.0));
-    let mut bench = StageBench::new(&kind(), "max_hypotheses = 2\nmin_omega = 0.9");
-    for (robot, map) in [("robot2", &b), ("robot3", &c), ("robot1", &c), ("robot1", &a)] {
-        assert_eq!(bench.give_map(robot, map), []);
-    }
-    let sent = bench.finish();
-    let pairs: Vec<(&str, &str)> = sent.iter().map(|one| (one.a.as_str(), one.b.as_str())).collect();
-    assert_eq!(pairs, [("robot1", "robot2"), ("robot1", "robot3"), ("robot2", "robot3")]);
-    for (one, (a, b)) in sent.iter().zip([(&a, &b), (&a, &c), (&b, &c)]) {
-        assert!(one.accepted && !one.provisional && one.score > 0.9, "{one:?}");
-        assert_eq!((one.method.as_str(), one.rank, one.hypotheses), ("hough_spectrum", 0, 0));
-        let (metres, radians) = apart(&one.transform_a_b(), &a.transform_to(b), b);
-        assert!(metres < 0.05 && radians < 0.004, "{metres} m, {radians} rad");
-    }
-    let guesses: Vec<gridweave_runtime::ros::Alignment> = bench.stage.take("hypotheses").unwrap();
-    let ranks: Vec<(u32, u32, bool)> = guesses.iter().map(|one| (one.rank, one.hypotheses, one.provisional)).collect();
-    assert_eq!(ranks, [(0, 2, true), (1, 2, true)].repeat(3));
-}
-
-#[test]
-fn a_refusal_has_a_reason() {
-    let office = FloorPlan::office().draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(3.0, 2.0, 0.4));
-    let other = FloorPlan::another_office().draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(1.0, 6.0, 1.4));
-    let part = FloorPlan::office().draw(seen(-0.2, -0.2, 4.0, 4.0), drawing(1.0, 6.0, 1.4));
-    for (parameters, b, text) in [
-        ("min_omega = 1.0", &other, "contradict each other"),
-        ("min_omega = 0.0\nmin_overlap = 1.0", &other, "overlap too little"),
-        ("max_extent = 15.0", &part, "the map of robot1 is longer"),
-    ] {
-        let mut bench = StageBench::new(&kind(), parameters);
-        bench.give_map("robot1", &office);
-        bench.give_map("robot2", b);
-        let sent = bench.finish();
-        assert!(!sent[0].accepted && sent[0].reason.contains(text), "{}", sent[0].reason);
-    }
-}
-
-#[test]
-fn parameters_out_of_range_are_refused() {
-    for text in [
-        "rotation_step = 0.0",
-        "min_omega = 1.1",
-        "rotations = 0",
-        "translations = 1000",
-        "cell = 0.01\nmax_extent = 400.0",
-        "cell = nan",
-    ] {
-        assert!(gridweave_runtime::stage::StageHarness::new(&kind(), text).is_err(), "{text}");
-    }
 }

@@ -1,9 +1,7 @@
 //! Probabilities, and the stage from outside.
 
 use super::*;
-use gridweave_runtime::message::LogTime;
-use gridweave_runtime::ros::{OccupancyGrid, TopologicalMap};
-use gridweave_runtime::stage::{Parameters, StageHarness};
+use gridweave_runtime::ros::TopologicalMap;
 use gridweave_stages::shared::geometry::{Cell, Grid, GridGeometry, Point2, Pose2, UNKNOWN, pose};
 use gridweave_stages::shared::test_world::floor_plan::{FloorPlan, drawing, seen};
 
@@ -98,31 +96,4 @@ fn the_diagram_is_drawn_in_the_frame_of_the_map() {
     let (here, there) = (junctions(&here, &Pose2::identity()), junctions(&there, &pose(3.0, 2.0, 0.4)));
     let found = here.iter().filter(|one| there.iter().any(|other| (*one - other).norm() < 0.3)).count();
     assert!(here.len() > 5 && 10 * found >= 8 * here.len(), "{found} of {}", here.len());
-}
-
-#[test]
-fn the_stage_sends_the_diagram_of_each_map_that_has_changed() {
-    let mut stage = StageHarness::new(&kind(), "min_probability = 0.3").unwrap();
-    let mut give = |robot: &str, cells: &[i8]| {
-        let data: Vec<u8> = cells.iter().map(|value| *value as u8).collect();
-        let header = gridweave_runtime::ros::Header { frame_id: "frame".into(), ..Default::default() };
-        let info = geometry().meta_data(Default::default());
-        let message = OccupancyGrid { header, info, data: &data };
-        stage.give::<OccupancyGrid<'_>>("map", robot, LogTime(1), &message).unwrap();
-        stage.take::<TopologicalMap>("topological_map").unwrap()
-    };
-    let sent = give("robot1", &corridor(100, 100, 0));
-    assert_eq!((sent[0].robot.as_str(), sent[0].header.frame_id.as_str()), ("robot1", "frame"));
-    assert_eq!((sent[0].nodes.len(), sent[0].paths.len()), (2, 1), "{:?}", sent[0].nodes);
-    assert!(give("robot1", &corridor(100, 100, 0)).is_empty(), "the same map again");
-    let unsure = give("robot1", &corridor(UNKNOWN, UNKNOWN, 0));
-    assert!(unsure[0].paths.is_empty(), "{:?}", unsure[0].paths);
-    assert!(give("robot1", &vec![UNKNOWN; WIDTH * 26])[0].nodes.is_empty());
-}
-
-#[test]
-fn parameters_out_of_range_are_refused() {
-    assert!(PgvdExtractorParameters::default().check().is_empty());
-    let wrong = PgvdExtractorParameters { min_spur: -1.0, min_probability: 1.5, ..Default::default() };
-    assert_eq!(wrong.check().len(), 2);
 }

@@ -1,11 +1,8 @@
 //! The aligner on drawn maps, and the stage from outside.
 
 use super::*;
-use gridweave_runtime::ros::OccupancyGrid;
-use gridweave_runtime::stage::Parameters;
-use gridweave_stages::shared::geometry::{Cell, Grid, GridGeometry, Pose2, UNKNOWN, pose, turn_difference};
+use gridweave_stages::shared::geometry::{Cell, Grid, GridGeometry, Pose2, turn_difference};
 use gridweave_stages::shared::test_world::floor_plan::{DrawnMap, FloorPlan, Seen, apart, drawing, seen};
-use gridweave_stages::shared::test_world::stage_bench::StageBench;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, TAU};
 
 const STEPS: usize = 360;
@@ -135,49 +132,4 @@ fn what_cannot_be_aligned_is_refused() {
     assert!(matches!(align_drawn(&office, &spokes, &sure), Err(RadonRefusal::NoRotation { .. })));
     let all = RadonAlignerParameters { min_overlap: 1.0, ..parameters };
     assert_eq!(align_drawn(&office, &other, &all).unwrap_err(), RadonRefusal::NoOverlap { percent: 100.0 });
-}
-
-#[test]
-fn maps_of_one_cell_or_all_walls_do_no_harm() {
-    let parameters = RadonAlignerParameters { min_correlation: 0.0, min_similarity: 0.0, ..Default::default() };
-    let geometry = |width, height| GridGeometry { width, height, resolution: 0.05, origin: pose(1e6, -3.0, 2.0) };
-    let grids = [(1, 1, vec![100]), (30, 20, vec![100; 600]), (0, 0, vec![]), (600, 1, vec![100; 600])];
-    for (width, height, cells) in &grids {
-        for (other_width, other_height, other_cells) in &grids {
-            let a = Grid::new(geometry(*width, *height), cells).unwrap();
-            let b = Grid::new(geometry(*other_width, *other_height), other_cells).unwrap();
-            let prepared = [a, b].map(|grid| PreparedMap::new(&grid, STEPS));
-            let named = |robot, grid, prepared| NamedMap { robot, grid, prepared };
-            let found = align(&named("a", a, &prepared[0]), &named("b", b, &prepared[1]), &parameters);
-            let is_finite = |found: &RadonAlignment| found.covariance.iter().all(|value| value.is_finite());
-            assert!(found.as_ref().map_or(true, is_finite), "{found:?}");
-        }
-    }
-}
-
-#[test]
-fn the_stage_aligns_a_pair_when_a_map_has_changed() {
-    let a = FloorPlan::office().draw(WEST, drawing(3.0, 2.0, 0.4));
-    let b = FloorPlan::office().draw(EAST, drawing(12.0, 6.0, -2.1));
-    let mut bench = StageBench::new(&kind(), "");
-    assert_eq!(bench.give_map("robot2", &b), []);
-    let sent = bench.give_map("robot1", &a);
-    assert_eq!((sent[0].a.as_str(), sent[0].b.as_str(), sent[0].method.as_str()), ("robot1", "robot2", "radon"));
-    assert!(sent[0].accepted && sent[0].has_transform && !sent[0].provisional, "{}", sent[0].reason);
-    assert!(sent[0].score > 0.9 && sent[0].reason.contains("at the next best of four rotations"), "{sent:?}");
-    let (metres, radians) = apart(&sent[0].transform_a_b(), &a.transform_to(&b), &b);
-    assert!(metres < 0.1 && radians < 0.01, "{metres} m, {radians} rad");
-    assert_eq!(bench.give_map("robot1", &a), [], "the same map again");
-    let unknown = OccupancyGrid { info: b.info(), data: &vec![UNKNOWN as u8; b.cells.len()], ..Default::default() };
-    let sent = bench.give_grid("robot2", &unknown);
-    assert!(!sent[0].accepted && !sent[0].has_transform, "{sent:?}");
-    assert_eq!(sent[0].reason, "the map of robot2 has no walls");
-    assert_eq!(bench.give_map("robot3", &b).len(), 2, "one for each pair");
-}
-
-#[test]
-fn parameters_out_of_range_are_refused() {
-    assert!(RadonAlignerParameters::default().check().is_empty());
-    let wrong = RadonAlignerParameters { angle_step: 0.0, shifts: 0, min_overlap: f64::NAN, ..Default::default() };
-    assert_eq!(wrong.check().len(), 3);
 }

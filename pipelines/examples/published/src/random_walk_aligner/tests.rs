@@ -1,7 +1,7 @@
 //! The method as a whole, on drawn maps, and the stage from outside.
 
 use super::*;
-use gridweave_runtime::stage::{Context, StageHarness};
+use gridweave_runtime::stage::Context;
 use gridweave_stages::registration::search::Raster;
 use gridweave_stages::shared::geometry::{Grid, GridGeometry, pose};
 use gridweave_stages::shared::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
@@ -104,18 +104,4 @@ fn the_stage_walks_with_its_seed_and_every_pair_by_itself() {
     let more = sent(7, &[("robot1", &a), ("robot2", &b), ("robot0", &c)]);
     let (place, again) = (one[0].transform_a_b(), more[2].transform_a_b());
     assert_eq!((more.len(), more[2].a.as_str(), place), (3, "robot1", again), "others change nothing");
-}
-
-#[test]
-fn parameters_out_of_range_are_refused() {
-    for text in [
-        "cell = 0.0",
-        "walks = 0",
-        "accept_worse = 1.5",
-        "cell = 0.01\nmax_extent = 400.0",
-        "max_points = 0",
-        "history = 0",
-    ] {
-        assert!(StageHarness::new(&kind(), text).is_err(), "{text}");
-    }
 }

@@ -3,7 +3,7 @@
 use super::*;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{OccupancyGrid, RobotFrame, RobotFrames};
-use gridweave_runtime::stage::{Parameters, StageHarness};
+use gridweave_runtime::stage::StageHarness;
 use gridweave_stages::merge::grid_fuser::layout::Lattice;
 use gridweave_stages::merge::grid_fuser::{KnownArea, PlacedGrid};
 use gridweave_stages::shared::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN, pose};
@@ -173,20 +173,6 @@ fn a_map_with_a_certain_frame_is_unchanged() {
     }
 }
 
-#[test]
-fn walls_far_from_the_frame_are_blurred_more_than_those_nearby() {
-    let map = office(0.1);
-    let frame = pose(3.0, 1.0, 0.6);
-    let carried = carried(&map, frame, &diagonal(0.02, 0.02, 0.03));
-    let most_near = |x: f64, y: f64| {
-        let near = (-3..=3).flat_map(|dx| (-3..=3).map(move |dy| (0.1 * f64::from(dx), 0.1 * f64::from(dy))));
-        near.map(|(dx, dy)| carried.grid().value_at(&(frame * Point2::new(x + dx, y + dy)))).max().unwrap()
-    };
-    // A turn moves the wall along y at x = 0 across itself.
-    let (near, far) = (most_near(0.0, 1.5), most_near(0.0, 10.5));
-    assert!(near >= 85 && (20..75).contains(&far), "{near} {far}");
-}
-
 fn frames(placed: &[(&str, Pose2, Matrix3<f64>)]) -> RobotFrames {
     let frame = |(robot, pose, covariance): &(&str, Pose2, Matrix3<f64>)| RobotFrame {
         robot: (*robot).into(),
@@ -239,17 +225,4 @@ fn the_stage_sends_maps_of_placed_robots_on_one_lattice_when_they_have_changed()
     );
     stage.give::<OccupancyGrid<'_>>("map", "a", LogTime(3), &message).unwrap();
     assert!(stage.take_messages("map").is_empty(), "the same map again");
-}
-
-#[test]
-fn parameters_out_of_range_are_refused() {
-    assert!(UncertainTransformParameters::default().check().is_empty());
-    let wrong = UncertainTransformParameters {
-        resolution: Some(0.0),
-        max_deviation: f64::NAN,
-        max_probability: 1.0,
-        max_cells: 0,
-        ..Default::default()
-    };
-    assert_eq!(wrong.check().len(), 4);
 }
