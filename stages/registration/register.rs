@@ -1,8 +1,8 @@
-//! Registration of two maps, from the cells to a verdict.
+//! Registration of two maps, from the cells to a decision.
 
 use super::comparison::MapView;
-use super::icp::{FirstGuess, IcpParameters, IcpRefusal, refine};
-use super::judgement::{Alias, JudgementParameters, SelfSimilarity, UserKnowledge, Verdict, judge};
+use super::icp::{IcpParameters, IcpRefusal, InitialGuess, refine};
+use super::judgement::{Alias, Decision, JudgementParameters, SelfSimilarity, UserKnowledge, judge};
 use super::search::{MapAlignerParameters, MapAlignment, PreparedMap, SearchRefusal, align_prepared};
 use super::{Basis, Hypothesis};
 use crate::shared::geometry::Grid;
@@ -52,7 +52,7 @@ impl<'a> PreparedPair<'a> {
 
     /// Refines a peak of the search.
     fn refined(&self, guess: &MapAlignment, reason: String, icp: &IcpParameters) -> Hypothesis {
-        let start = FirstGuess::new(guess.transform_a_b, guess.covariance, icp);
+        let start = InitialGuess::new(guess.transform_a_b, guess.covariance, icp);
         let [a, b] = &self.walls;
         let refinement = refine(a, b, &start, icp);
         let registration = &refinement.registration;
@@ -88,15 +88,15 @@ pub fn register(
     pair: &PreparedPair<'_>,
     known: &UserKnowledge,
     parameters: &RegistrationParameters,
-) -> Result<Option<Verdict>, SearchRefusal> {
+) -> Result<Option<Decision>, SearchRefusal> {
     let RegistrationParameters { search, icp, judgement } = parameters;
     let hypotheses = pair.hypotheses(known, search, icp)?;
     let [a, b] = pair.views();
-    let Some(verdict) = judge(&a, &b, &hypotheses, known, judgement) else { return Ok(None) };
-    if !verdict.rests_on_maps_alone() {
-        return Ok(Some(verdict));
+    let Some(decision) = judge(&a, &b, &hypotheses, known, judgement) else { return Ok(None) };
+    if !decision.rests_on_maps_alone() {
+        return Ok(Some(decision));
     }
     let [similar_a, similar_b] = [&a, &b].map(|view| SelfSimilarity::new(view, judgement));
-    let alias = Alias::likeliest(&verdict, (&a, &similar_a), (&b, &similar_b), known.window.as_ref(), judgement);
-    Ok(Some(verdict.against(alias.as_ref(), judgement)))
+    let alias = Alias::likeliest(&decision, (&a, &similar_a), (&b, &similar_b), known.window.as_ref(), judgement);
+    Ok(Some(decision.against(alias.as_ref(), judgement)))
 }

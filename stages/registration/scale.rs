@@ -4,7 +4,7 @@
 //! cells of map b smaller and larger, in steps so small that the ends of a building move by less than the search
 //! tolerates.
 
-use super::judgement::{UserKnowledge, Verdict};
+use super::judgement::{Decision, UserKnowledge};
 use super::search::{MapAlignerParameters, PreparedMap, peak_significance};
 use super::{PreparedPair, RegistrationParameters, register};
 use crate::shared::geometry::{Grid, GridGeometry};
@@ -33,8 +33,8 @@ pub(super) const LEAST_PROBABILITY: f64 = 0.5;
 pub struct Scale {
     /// Size of map b as a share of the size that it has by its resolution.
     pub factor: f64,
-    /// Verdict on the maps with map b at that size.
-    pub verdict: Verdict,
+    /// Decision on the maps with map b at that size.
+    pub decision: Decision,
 }
 
 impl Scale {
@@ -78,7 +78,7 @@ impl Scale {
             step = if best.factor == last { 0.5 * step } else { step };
         }
         // A deformation makes up for what is left, and shows it.
-        let left = best.verdict.candidate.deformed.map(|deformed| best.factor * deformed.scale);
+        let left = best.decision.candidate.deformed.map(|deformed| best.factor * deformed.scale);
         let best = left.and_then(at).unwrap_or(best);
         // At the end of the range the maps may agree better beyond it.
         let is_inside = is_within(best.factor * (1.0 + LEAST_ERROR)) && is_within(best.factor / (1.0 + LEAST_ERROR));
@@ -104,12 +104,12 @@ impl Scale {
 
     /// Log-odds of the maps at this scale, before they are compared with those of other poses.
     fn log_odds(&self) -> f64 {
-        self.verdict.candidate.terms().log_odds()
+        self.decision.candidate.terms().log_odds()
     }
 
     /// Precision of the walls that agree: their length over the variance of where they are drawn.
     fn precision(&self) -> f64 {
-        let agreement = &self.verdict.candidate.agreement;
+        let agreement = &self.decision.candidate.agreement;
         agreement.inlier_length / (NOISE.powi(2) + agreement.residual.powi(2))
     }
 
@@ -117,10 +117,10 @@ impl Scale {
     /// where one of all factors that were tried may fit by chance.
     fn at(a: Grid<'_>, b: Grid<'_>, factor: f64, tried: usize, parameters: &RegistrationParameters) -> Option<Self> {
         let pair = PreparedPair::new(a, scaled(b, factor), &parameters.search).ok()?;
-        let verdict = register(&pair, &UserKnowledge::default(), parameters).ok()??;
-        let odds = verdict.probability / (1.0 - verdict.probability).max(f64::EPSILON) / tried as f64;
+        let decision = register(&pair, &UserKnowledge::default(), parameters).ok()??;
+        let odds = decision.probability / (1.0 - decision.probability).max(f64::EPSILON) / tried as f64;
         let is_probable = odds / (1.0 + odds) >= LEAST_PROBABILITY;
-        (is_probable && !verdict.candidate.hypothesis.is_refused).then_some(Self { factor, verdict })
+        (is_probable && !decision.candidate.hypothesis.is_refused).then_some(Self { factor, decision })
     }
 }
 
@@ -184,7 +184,7 @@ mod tests {
         let (a, b) = (a.view().grid, b.view().grid);
         let found = Scale::search(a, scaled(b, 1.0 / 0.88), 0.2, &parameters).unwrap();
         assert!((found.factor - 0.88).abs() < 0.005, "{}", found.factor);
-        assert!(found.verdict.candidate.agreement.inlier_length > 20.0);
+        assert!(found.decision.candidate.agreement.inlier_length > 20.0);
         let beyond = Scale::search(a, scaled(b, 1.0 / 0.88), 0.05, &parameters);
         assert!(beyond.is_none_or(|scale| scale.factor.ln().abs() <= 1.05_f64.ln()), "not beyond the range");
         assert!(Scale::search(a, b, 0.2, &parameters).is_none(), "the resolution is right");
@@ -202,12 +202,12 @@ mod tests {
     fn a_map_that_is_deformed_to_another_size_puts_its_resolution_in_doubt() {
         let [a, b] = office();
         let parameters = RegistrationParameters::default();
-        let verdict = |factor: f64| {
+        let decision = |factor: f64| {
             let pair = PreparedPair::new(a.view().grid, scaled(b.view().grid, factor), &parameters.search).unwrap();
             register(&pair, &UserKnowledge::default(), &parameters).unwrap().unwrap()
         };
-        assert_eq!(verdict(1.0).other_scale(), None);
-        let larger = verdict(1.06);
+        assert_eq!(decision(1.0).other_scale(), None);
+        let larger = decision(1.06);
         let scale = larger.other_scale().unwrap();
         assert!((scale * 1.06 - 1.0).abs() < 0.02, "{scale}");
         assert!(larger.reason(0.98, "verifier", "a", "b").contains("which makes b 0.9"));

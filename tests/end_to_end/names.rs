@@ -25,7 +25,7 @@ struct World {
 }
 
 /// The topics of one robot, and what it calls its frames.
-struct Convention<'a> {
+struct NamingStyle<'a> {
     map: &'a str,
     pose: &'a str,
     tf: &'a str,
@@ -35,7 +35,7 @@ struct Convention<'a> {
 }
 
 /// One robot that knows of no other.
-const ALONE: Convention<'_> = Convention { map: "/map", pose: "/amcl_pose", tf: "", frames: ["", ""], others: "" };
+const ALONE: NamingStyle<'_> = NamingStyle { map: "/map", pose: "/amcl_pose", tf: "", frames: ["", ""], others: "" };
 
 impl World {
     fn new() -> Self {
@@ -45,7 +45,7 @@ impl World {
     }
 
     /// Writes a log of the robots, each by its convention.
-    fn write(&self, name: &str, robots: &[(&str, &Convention<'_>)]) {
+    fn write(&self, name: &str, robots: &[(&str, &NamingStyle<'_>)]) {
         let mut out = LogBuilder::new(&self.folder.path().join(name));
         let mut reader = LogReader::new(vec![LogFile::open(&self.log).unwrap()]);
         let files = reader.files().clone();
@@ -63,7 +63,7 @@ impl World {
             if started.insert(*robot) && self.is_placed {
                 // The poses of the maps were recorded, as static transforms and as periodic ones.
                 for (topic, parent) in [("/tf_static", "world"), ("/tf", "earth")] {
-                    let placed = Convention { frames: ["", ""], ..**names };
+                    let placed = NamingStyle { frames: ["", ""], ..**names };
                     out.message(
                         seconds,
                         topic,
@@ -121,7 +121,7 @@ impl World {
     }
 }
 
-impl Convention<'_> {
+impl NamingStyle<'_> {
     fn transform(
         &self,
         time: LogTime,
@@ -202,8 +202,8 @@ fn a_map_with_a_recorded_pose_is_placed_only_by_the_merge() {
     let world = World { is_placed: true, ..World::new() };
     let [first, second] = ["robot1", "robot2"]
         .map(|robot| [format!("/{robot}/map"), format!("/{robot}/pose"), format!("{robot}/"), format!("/{robot}")]);
-    fn named([map, pose, frames, others]: &[String; 4]) -> Convention<'_> {
-        Convention { map, pose, tf: "", frames: [frames, frames], others }
+    fn named([map, pose, frames, others]: &[String; 4]) -> NamingStyle<'_> {
+        NamingStyle { map, pose, tf: "", frames: [frames, frames], others }
     }
     world.write("all.mcap", &[("robot1", &named(&first)), ("robot2", &named(&second))]);
     let ended = world.merge(&["all.mcap"], ["robot1", "robot2"]);
@@ -217,7 +217,7 @@ fn a_map_with_a_recorded_pose_is_placed_only_by_the_merge() {
 #[test]
 fn poses_that_are_in_tf_alone_are_found_there() {
     let world = World::new();
-    let only_tf = Convention { pose: "", ..ALONE };
+    let only_tf = NamingStyle { pose: "", ..ALONE };
     world.write("a.mcap", &[("robot1", &only_tf)]);
     world.write("b.mcap", &[("robot2", &only_tf)]);
     world.merge(&["robot1=a.mcap", "robot2=b.mcap"], ["robot1", "robot2"]);
@@ -246,17 +246,17 @@ fn transforms_in_a_robots_namespace_join_the_tree() {
             "robot1" => ["/robot1/map", "/robot1/amcl_pose", "/robot1"],
             _ => ["/robot2/map", "/robot2/pose", "/robot2"],
         };
-        Convention { map, pose, tf: namespace, frames: ["", ""], others: namespace }
+        NamingStyle { map, pose, tf: namespace, frames: ["", ""], others: namespace }
     };
     world.write("all.mcap", &[("robot1", &bare("robot1")), ("robot2", &bare("robot2"))]);
     world.merge(&["all.mcap"], ["robot1", "robot2"]);
     // Full names in `/tf`, and none in maps and poses.
-    let mixed = |robot| Convention {
+    let mixed = |robot| NamingStyle {
         tf: "",
         frames: [if robot == "robot1" { "robot1/" } else { "robot2/" }, ""],
         ..bare(robot)
     };
-    let mixed = [mixed("robot1"), mixed("robot2")].map(|names| Convention { frames: [names.frames[0]; 2], ..names });
+    let mixed = [mixed("robot1"), mixed("robot2")].map(|names| NamingStyle { frames: [names.frames[0]; 2], ..names });
     world.write("all.mcap", &[("robot1", &mixed[0]), ("robot2", &mixed[1])]);
     world.merge(&["all.mcap"], ["robot1", "robot2"]);
 }
@@ -264,7 +264,7 @@ fn transforms_in_a_robots_namespace_join_the_tree() {
 #[test]
 fn topics_are_renamed_and_robots_and_times_chosen_on_the_command_line() {
     let world = World::new();
-    let odd = Convention { map: "/slam/grid", ..ALONE };
+    let odd = NamingStyle { map: "/slam/grid", ..ALONE };
     world.write("a.mcap", &[("robot1", &odd)]);
     world.write("b.mcap", &[("robot2", &odd)]);
     let inputs = ["robot1=a.mcap", "robot2=b.mcap", "--rename", "/slam/grid=/map"];

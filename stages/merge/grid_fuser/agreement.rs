@@ -13,7 +13,7 @@ const BLOCK: usize = 1 << 16;
 
 /// Counts of the cells of a fused map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Agreement {
+pub struct CellCounts {
     /// Cells that only one map knows.
     pub known_to_one: u64,
     /// Cells that several maps know, including those in conflict.
@@ -22,7 +22,7 @@ pub struct Agreement {
     pub in_conflict: u64,
 }
 
-impl Agreement {
+impl CellCounts {
     /// Counts the cells of a fused map and of its conflicts, which have the same size.
     pub fn of(cells: &[i8], conflicts: &[i8]) -> Self {
         let blocks = cells.par_chunks(BLOCK).zip(conflicts.par_chunks(BLOCK));
@@ -51,7 +51,7 @@ impl Agreement {
     }
 }
 
-impl Add for Agreement {
+impl Add for CellCounts {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
@@ -69,16 +69,16 @@ mod tests {
 
     #[test]
     fn cells_are_counted_once() {
-        let agreement = Agreement::of(&[-1, 0, 100, 0, 50, 80, 0], &[-1, -1, -1, 0, 100, 50, 49]);
-        assert_eq!(agreement, Agreement { known_to_one: 2, known_to_several: 4, in_conflict: 2 });
-        assert_eq!(Agreement::of(&[], &[]), Agreement::default());
+        let agreement = CellCounts::of(&[-1, 0, 100, 0, 50, 80, 0], &[-1, -1, -1, 0, 100, 50, 49]);
+        assert_eq!(agreement, CellCounts { known_to_one: 2, known_to_several: 4, in_conflict: 2 });
+        assert_eq!(CellCounts::of(&[], &[]), CellCounts::default());
     }
 
     #[test]
     fn blocks_add_up() {
         let (cells, conflicts) = (vec![0; 3 * BLOCK + 7], vec![100; 3 * BLOCK + 7]);
         let all = (3 * BLOCK + 7) as u64;
-        let expected = Agreement { known_to_one: 0, known_to_several: all, in_conflict: all };
-        assert_eq!(Agreement::of(&cells, &conflicts), expected);
+        let expected = CellCounts { known_to_one: 0, known_to_several: all, in_conflict: all };
+        assert_eq!(CellCounts::of(&cells, &conflicts), expected);
     }
 }

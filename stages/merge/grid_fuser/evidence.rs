@@ -21,7 +21,7 @@ const MOST_STEPS: f64 = 16_384.0;
 #[derive(Clone, Debug)]
 pub struct EvidenceTable {
     /// Evidence of a map's cell, by its value as an unsigned byte.
-    of_value: Box<[Evidence; 256]>,
+    of_value: Box<[CellEvidence; 256]>,
     /// The value for every sum from the lowest to the highest.
     values: Vec<i8>,
     /// Log-odds of the two bounds, in steps: the most that one map can add for a free cell, below 0, and for an
@@ -44,8 +44,8 @@ impl EvidenceTable {
             _ => (100.0 / (1.0 + (-f64::from(sum) / STEPS).exp())).round() as i8,
         };
         let of_value = |byte: usize| match u32::try_from(byte) {
-            Ok(value @ 0..=100) => Evidence::of_one_map(value, steps(f64::from(value) / 100.0)),
-            _ => Evidence::NONE,
+            Ok(value @ 0..=100) => CellEvidence::of_one_map(value, steps(f64::from(value) / 100.0)),
+            _ => CellEvidence::NONE,
         };
         Self {
             of_value: Box::new(std::array::from_fn(of_value)),
@@ -56,12 +56,12 @@ impl EvidenceTable {
     }
 
     /// Adds a map's cell. Invalid values and unknown cells, such as -1, add nothing.
-    pub fn add(&self, cell: &mut Evidence, value: i8) {
+    pub fn add(&self, cell: &mut CellEvidence, value: i8) {
         *cell = cell.plus(self.of_value[usize::from(value.cast_unsigned())]);
     }
 
     /// Value of the evidence.
-    pub fn value(&self, cell: Evidence) -> i8 {
+    pub fn value(&self, cell: CellEvidence) -> i8 {
         match cell.maps {
             0 => UNKNOWN,
             1 => cell.values as i8,
@@ -78,11 +78,11 @@ impl EvidenceTable {
     /// The log-odds for occupied and those for free are divided by the most that one map can add for each (its
     /// bound), clamped to 1. The smaller share counts, in percent. So 100 is where maps of greatest certainty are on
     /// both sides, and uncertain cells are hardly in conflict.
-    pub fn conflict(&self, cell: Evidence) -> i8 {
+    pub fn conflict(&self, cell: CellEvidence) -> i8 {
         match cell {
-            Evidence { maps: 0 | 1, .. } => UNKNOWN,
-            Evidence { occupied: 0, .. } | Evidence { free: 0, .. } => 0,
-            Evidence { occupied, free, .. } => {
+            CellEvidence { maps: 0 | 1, .. } => UNKNOWN,
+            CellEvidence { occupied: 0, .. } | CellEvidence { free: 0, .. } => 0,
+            CellEvidence { occupied, free, .. } => {
                 percent(occupied, self.highest.unsigned_abs()).min(percent(free, self.lowest.unsigned_abs()))
             }
         }
@@ -98,7 +98,7 @@ fn percent(sum: u32, most: u32) -> i8 {
 /// Evidence of the maps on one cell. All fields are sums over the maps, so that their order does not matter and
 /// adding needs no branch; the sums of 200,000 maps fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Evidence {
+pub struct CellEvidence {
     /// Log-odds for occupied, in steps.
     occupied: u32,
     /// Log-odds for free, in steps.
@@ -109,7 +109,7 @@ pub struct Evidence {
     values: u32,
 }
 
-impl Evidence {
+impl CellEvidence {
     /// No map knows the cell.
     pub const NONE: Self = Self { occupied: 0, free: 0, maps: 0, values: 0 };
 
@@ -141,14 +141,14 @@ mod tests {
 
     fn fuse(values: &[i8]) -> i8 {
         let table = table();
-        let mut cell = Evidence::NONE;
+        let mut cell = CellEvidence::NONE;
         values.iter().for_each(|&value| table.add(&mut cell, value));
         table.value(cell)
     }
 
     fn conflict(values: &[i8]) -> i8 {
         let table = table();
-        let mut cell = Evidence::NONE;
+        let mut cell = CellEvidence::NONE;
         values.iter().for_each(|&value| table.add(&mut cell, value));
         table.conflict(cell)
     }
@@ -210,7 +210,7 @@ mod tests {
     fn invalid_bounds_do_no_harm() {
         for (low, high) in [(f64::NAN, 0.9), (0.0, 1.0), (0.9, 0.1), (-1.0, 2.0)] {
             let table = EvidenceTable::new(low, high);
-            let mut cell = Evidence::NONE;
+            let mut cell = CellEvidence::NONE;
             (0..=100).for_each(|value| table.add(&mut cell, value));
             let _ = table.value(cell);
             assert!((0..=100).contains(&table.conflict(cell)));

@@ -2,7 +2,7 @@
 //!
 //! Rounding turned cells leaves gaps (equations 14, 15), which a conditional mean closes.
 
-use super::evidence::{Evidence, EvidenceTable};
+use super::evidence::{CellEvidence, EvidenceTable};
 use super::{Fused, KnownArea, PlacedGrid};
 use crate::shared::geometry::{Cell, GridGeometry, UNKNOWN, is_known, is_occupied};
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ const GAP_NEIGHBOURS: usize = 6;
 /// Writes the fused map of `maps` and their conflicts to `fused`, the rows of `geometry`: each map is transformed,
 /// its gaps are closed, and the evidence is added.
 pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, table: &EvidenceTable, fused: Fused<'_>) {
-    let mut evidence = vec![Evidence::NONE; fused.cells.len()];
+    let mut evidence = vec![CellEvidence::NONE; fused.cells.len()];
     for (map, _) in maps {
         let carried = close_gaps(&carry(map, geometry), geometry);
         evidence.par_iter_mut().zip(carried).for_each(|(evidence, value)| table.add(evidence, value));
@@ -89,8 +89,7 @@ impl Sum {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shared::geometry::{Pose2, pose};
-    use nalgebra::{Isometry2, Translation2};
+    use crate::shared::geometry::Pose2;
 
     #[test]
     fn grids_without_cells_have_no_gaps() {

@@ -1,6 +1,6 @@
 //! Fusion by inverse mapping: every output cell is looked up in the maps.
 
-use super::evidence::{Evidence, EvidenceTable};
+use super::evidence::{CellEvidence, EvidenceTable};
 use super::known::TILE;
 use super::{Fused, KnownArea, PlacedGrid};
 use crate::shared::deformation::Deformation;
@@ -26,7 +26,7 @@ pub fn fuse(maps: &[(PlacedGrid<'_>, &KnownArea)], geometry: &GridGeometry, tabl
             let mut stretches = rows.iter().filter_map(|row| row.stretch(stretch * TILE, cells.len()));
             match (stretches.next(), stretches.next()) {
                 (Some(one), Some(other)) => {
-                    let mut evidence = [Evidence::NONE; TILE];
+                    let mut evidence = [CellEvidence::NONE; TILE];
                     for stretch in [one, other].iter().chain(&stretches.collect::<Vec<_>>()) {
                         stretch.values(&mut evidence, |evidence, value| table.add(evidence, value));
                     }

@@ -1,6 +1,6 @@
 //! The grid fuser as a stage.
 
-use super::agreement::Agreement;
+use super::agreement::CellCounts;
 use super::evidence::EvidenceTable;
 use super::layout::{Lattice, layout_of};
 use super::{Fused, GridFuserParameters, KnownArea, PlacedGrid, Warp, forward, inverse};
@@ -181,7 +181,7 @@ impl GridFuser {
                 Warp::Inverse => inverse::fuse(&maps, &geometry, &self.table, fused),
                 Warp::Forward => forward::fuse(&maps, &geometry, &self.table, fused),
             }
-            agreement = output.agreement.is_read().then(|| Agreement::of(cells, &conflicts));
+            agreement = output.agreement.is_read().then(|| CellCounts::of(cells, &conflicts));
         };
         match output.map.is_read() {
             true => output.map.send_grid("", &prefix, |blank| {

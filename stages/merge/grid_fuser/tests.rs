@@ -3,8 +3,7 @@
 use super::kind;
 use gridweave_runtime::message::{LogTime, Message, MessageHeader, Write, write_vec};
 use gridweave_runtime::ros::{
-    DeformationNode, MapAgreement, MapDeformation, MapMetaData, OccupancyGrid, Pose, RobotFrame, RobotFrames,
-    UnmergedRobot, encode,
+    DeformationNode, MapDeformation, MapMetaData, OccupancyGrid, Pose, RobotFrame, RobotFrames, UnmergedRobot, encode,
 };
 use gridweave_runtime::stage::{Context, OutputEnd, OutputSink, StageError, StageHarness};
 use std::cell::RefCell;

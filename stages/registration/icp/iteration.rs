@@ -1,8 +1,8 @@
 //! One iteration of ICP: find correspondences, weigh them, solve for the change.
 
-use super::first_guess::LocalFrame;
+use super::initial_guess::LocalFrame;
 use super::normal_equations::{Measurement, NormalEquations};
-use super::{FirstGuess, IcpParameters, Metric, Weighting};
+use super::{IcpParameters, InitialGuess, Metric, Weighting};
 use crate::shared::geometry::{Pose2, quarter_turn};
 use crate::shared::walls::WallMap;
 use nalgebra::{Matrix3, Vector2, Vector3};
@@ -18,7 +18,7 @@ const LEAST_SCALE: f64 = 0.1;
 pub(super) struct Iteration<'a> {
     a: &'a WallMap,
     b: &'a WallMap,
-    first_guess: &'a FirstGuess,
+    initial_guess: &'a InitialGuess,
     pub(super) parameters: &'a IcpParameters,
     measurements: Vec<Measurement>,
     /// For each point of b, the wall of a that was nearest when it was last paired.
@@ -50,19 +50,19 @@ impl<'a> Iteration<'a> {
     pub(super) fn new(
         a: &'a WallMap,
         b: &'a WallMap,
-        first_guess: &'a FirstGuess,
+        initial_guess: &'a InitialGuess,
         parameters: &'a IcpParameters,
     ) -> Self {
-        let frame = LocalFrame { centre: first_guess.transform_a_b.translation.vector.into(), scale: 1.0 };
+        let frame = LocalFrame { centre: initial_guess.transform_a_b.translation.vector.into(), scale: 1.0 };
         let state = IterationState {
             frame,
             information: Matrix3::zeros(),
-            covariance: first_guess.local_covariance(&frame, parameters),
+            covariance: initial_guess.local_covariance(&frame, parameters),
             inliers: 0,
             mean_square_error: 0.0,
         };
         let partners = vec![u32::MAX; b.walls.points().len()];
-        Self { a, b, first_guess, parameters, measurements: Vec::new(), partners, state }
+        Self { a, b, initial_guess, parameters, measurements: Vec::new(), partners, state }
     }
 
     /// Estimate of the last iteration.
@@ -90,9 +90,9 @@ impl<'a> Iteration<'a> {
         let equations = NormalEquations::new(&self.measurements);
         let gain = self.gain(&equations, inliers, stride);
         let information = equations.information * gain;
-        let prior = self.first_guess.local_covariance(&frame, self.parameters).try_inverse()?;
+        let prior = self.initial_guess.local_covariance(&frame, self.parameters).try_inverse()?;
         let covariance = (information + prior).try_inverse()?;
-        let deviation = self.first_guess.local_deviation(transform_a_b, &frame);
+        let deviation = self.initial_guess.local_deviation(transform_a_b, &frame);
         let change = covariance * (equations.vector * gain - prior * deviation);
         if !change.iter().chain(covariance.iter()).all(|value| value.is_finite()) {
             return None;

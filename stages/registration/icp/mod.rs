@@ -3,7 +3,7 @@
 //! [`register`] moves map b until its walls are aligned with those of map a, where both are near each other;
 //! [`IcpRefusal`] is the reason why the result may not be used. [`refine`] does both.
 
-mod first_guess;
+mod initial_guess;
 mod iteration;
 mod normal_equations;
 mod parameters;
@@ -14,7 +14,7 @@ mod registration;
 #[cfg(test)]
 mod tests;
 
-pub use first_guess::FirstGuess;
+pub use initial_guess::InitialGuess;
 pub use parameters::{IcpParameters, Metric, Weighting};
 pub use refine::{Refinement, refine};
 pub use refusal::IcpRefusal;

@@ -1,6 +1,6 @@
 //! Registration and the check of its result.
 
-use super::{FirstGuess, IcpParameters, IcpRefusal, Registration, register};
+use super::{IcpParameters, IcpRefusal, InitialGuess, Registration, register};
 use crate::shared::walls::WallMap;
 
 /// A refined alignment, and whether it may be used.
@@ -24,8 +24,8 @@ impl Refinement {
 
 /// Refines a first guess of `T_a_b`, and checks that the walls constrain the result. Whether the maps agree there is
 /// judged by `merge_verifier`.
-pub fn refine(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: &IcpParameters) -> Refinement {
-    let registration = register(a, b, first_guess, parameters);
+pub fn refine(a: &WallMap, b: &WallMap, initial_guess: &InitialGuess, parameters: &IcpParameters) -> Refinement {
+    let registration = register(a, b, initial_guess, parameters);
     let refusal = IcpRefusal::of(&registration, parameters);
     Refinement { registration, refusal }
 }

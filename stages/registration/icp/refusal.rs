@@ -1,7 +1,7 @@
 //! Why a refined alignment may not be used.
 
-use super::first_guess::LocalFrame;
-use super::{FirstGuess, IcpParameters, Registration};
+use super::initial_guess::LocalFrame;
+use super::{IcpParameters, InitialGuess, Registration};
 use crate::shared::number_text::beside_bound;
 use gridweave_runtime::covariance_ellipse::CovarianceEllipse;
 use nalgebra::Matrix2;
@@ -81,13 +81,13 @@ impl IcpRefusal {
     /// Along a corridor with few walls across, registration converges to the nearest of them, right or wrong, and
     /// reports a small covariance; the width of the peak is then the true uncertainty.
     pub fn of_search(
-        first_guess: &FirstGuess,
+        initial_guess: &InitialGuess,
         registration: &Registration,
         parameters: &IcpParameters,
     ) -> Option<Self> {
         let frame = LocalFrame { centre: registration.centre, scale: 1.0 };
-        let derivative = frame.inverse_jacobian(&first_guess.transform_a_b);
-        let covariance = derivative * first_guess.covariance * derivative.transpose();
+        let derivative = frame.inverse_jacobian(&initial_guess.transform_a_b);
+        let covariance = derivative * initial_guess.covariance * derivative.transpose();
         let (along, direction) = widest_deviation(&covariance.fixed_view::<2, 2>(0, 0).into_owned());
         let most = parameters.max_deviation;
         // A value that is not a number refuses, too.

@@ -1,7 +1,7 @@
 //! ICP: moves map b until its walls are aligned with those of map a.
 
 use super::iteration::Iteration;
-use super::{FirstGuess, IcpParameters};
+use super::{IcpParameters, InitialGuess};
 use crate::shared::geometry::{Point2, Pose2};
 use crate::shared::walls::{WallMap, stride};
 use nalgebra::{Matrix3, Vector3};
@@ -51,11 +51,11 @@ pub struct Registration {
 /// Far from the centre of the maps a small turn moves a wall by more than the distance to the next wall. So where the
 /// first guess's rotation is uncertain, several rotations are tried on a sample of the points, and the one with most
 /// inliers is continued.
-pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: &IcpParameters) -> Registration {
-    let mut iteration = Iteration::new(a, b, first_guess, parameters);
+pub fn register(a: &WallMap, b: &WallMap, initial_guess: &InitialGuess, parameters: &IcpParameters) -> Registration {
+    let mut iteration = Iteration::new(a, b, initial_guess, parameters);
     let stride = stride(b.walls.points().len(), parameters.coarse_points);
     let mut best: Option<(f64, Pose2, Vec<f64>)> = None;
-    for start in starts(&mut iteration, first_guess, stride, parameters) {
+    for start in starts(&mut iteration, initial_guess, stride, parameters) {
         let (transform_a_b, errors) = draw_near(&mut iteration, start, stride, parameters);
         let matched = iteration.matched(&transform_a_b, stride);
         if best.as_ref().is_none_or(|(most, ..)| matched > *most) {
@@ -63,7 +63,7 @@ pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: 
         }
     }
     let (mut transform_a_b, mut errors) =
-        best.map_or((first_guess.transform_a_b, Vec::new()), |(_, transform, errors)| (transform, errors));
+        best.map_or((initial_guess.transform_a_b, Vec::new()), |(_, transform, errors)| (transform, errors));
     let last_motion = settle(&mut iteration, &mut transform_a_b, &mut errors);
     let converged = last_motion.is_some_and(|motion| motion < parameters.convergence);
     iteration.measure_by_lines(&transform_a_b);
@@ -86,7 +86,7 @@ pub fn register(a: &WallMap, b: &WallMap, first_guess: &FirstGuess, parameters: 
         centre: frame.centre,
         centre_covariance: metres_to_radians * covariance * metres_to_radians,
         radius: frame.scale,
-        step: first_guess.distance(&transform_a_b, &frame, parameters),
+        step: initial_guess.distance(&transform_a_b, &frame, parameters),
     }
 }
 
@@ -140,12 +140,12 @@ fn draw_near(
 /// up to two standard deviations to either side.
 fn starts(
     iteration: &mut Iteration<'_>,
-    first_guess: &FirstGuess,
+    initial_guess: &InitialGuess,
     stride: usize,
     parameters: &IcpParameters,
 ) -> Vec<Pose2> {
-    let initial = first_guess.transform_a_b;
-    let deviation = first_guess.covariance.m33.sqrt();
+    let initial = initial_guess.transform_a_b;
+    let deviation = initial_guess.covariance.m33.sqrt();
     let count = (2.0 * deviation / parameters.start_spacing).round() as usize;
     let mut starts = vec![initial];
     if count > 0 {

@@ -1,6 +1,6 @@
 //! Registration on drawn floor plans.
 
-use super::{FirstGuess, IcpParameters, IcpRefusal, Metric, Weighting, refine, register};
+use super::{IcpParameters, IcpRefusal, InitialGuess, Metric, Weighting, refine, register};
 use crate::shared::geometry::{Grid, GridGeometry, Pose2, pose};
 use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
 use crate::shared::walls::WallMap;
@@ -17,12 +17,12 @@ fn office_maps() -> (DrawnMap, DrawnMap) {
 }
 
 /// A first guess that is off by a shift and a turn about the origin of map b, with a covariance as large.
-fn guess(transform_a_b: Pose2, x: f64, y: f64, yaw: f64) -> FirstGuess {
+fn guess(transform_a_b: Pose2, x: f64, y: f64, yaw: f64) -> InitialGuess {
     let covariance = Matrix3::from_diagonal(&Vector3::new(0.3 * 0.3, 0.3 * 0.3, 0.05 * 0.05));
     let mut transform_a_b = transform_a_b;
     transform_a_b.translation.vector += Vector2::new(x, y);
     transform_a_b.rotation *= nalgebra::UnitComplex::new(yaw);
-    FirstGuess { transform_a_b, covariance }
+    InitialGuess { transform_a_b, covariance }
 }
 
 fn assert_near(found: &Pose2, truth: &Pose2, map_b: &DrawnMap) {
@@ -36,8 +36,8 @@ fn starts_half_a_metre_and_five_degrees_off_find_the_truth() {
     let (a, b) = office_maps();
     let truth = a.transform_to(&b);
     for (x, y, degrees) in [(0.0, 0.0, 0.0), (0.5, 0.0, 5.0), (0.0, -0.5, 5.0), (-0.35, 0.35, -5.0), (0.3, 0.4, -5.0)] {
-        let first_guess = guess(truth, x, y, f64::to_radians(degrees));
-        let refinement = refine(&a.walls, &b.walls, &first_guess, &IcpParameters::default());
+        let initial_guess = guess(truth, x, y, f64::to_radians(degrees));
+        let refinement = refine(&a.walls, &b.walls, &initial_guess, &IcpParameters::default());
         assert_near(&refinement.registration.transform_a_b, &truth, &b);
         assert_eq!(refinement.refusal, None);
         assert!(refinement.registration.covariance.cholesky().is_some());
@@ -48,8 +48,8 @@ fn starts_half_a_metre_and_five_degrees_off_find_the_truth() {
 fn registering_the_other_way_round_finds_the_inverse() {
     let (a, b) = office_maps();
     let truth = a.transform_to(&b);
-    let first_guess = guess(truth.inverse(), 0.2, -0.1, 0.03);
-    let registration = register(&b.walls, &a.walls, &first_guess, &IcpParameters::default());
+    let initial_guess = guess(truth.inverse(), 0.2, -0.1, 0.03);
+    let registration = register(&b.walls, &a.walls, &initial_guess, &IcpParameters::default());
     assert!(registration.converged);
     assert_near(&registration.transform_a_b.inverse(), &truth, &b);
 }
@@ -65,7 +65,7 @@ fn moving_the_frames_moves_the_result_along() {
         let registration = register(
             &a.walls,
             &b.walls,
-            &FirstGuess { transform_a_b: turned, ..guess(truth, 0.0, 0.0, 0.0) },
+            &InitialGuess { transform_a_b: turned, ..guess(truth, 0.0, 0.0, 0.0) },
             &IcpParameters::default(),
         );
         assert_near(&registration.transform_a_b, &truth, &b);
@@ -100,8 +100,8 @@ proptest! {
             let map = WallMap::new(&grid, 0.2);
             let parameters = IcpParameters::default();
             let start = pose(start[0], start[1], start[2]);
-            let first_guess = FirstGuess::new(start, Matrix3::from_diagonal(&covariance.into()), &parameters);
-            let refinement = refine(&map, &map, &first_guess, &parameters);
+            let initial_guess = InitialGuess::new(start, Matrix3::from_diagonal(&covariance.into()), &parameters);
+            let refinement = refine(&map, &map, &initial_guess, &parameters);
             prop_assert!(!refinement.reason().is_empty());
         }
     }
@@ -114,9 +114,9 @@ fn along_a_bare_corridor_the_first_guess_stays_and_its_uncertainty_is_reported()
     let b = corridor.draw(seen(10.0, -1.5, 50.0, 1.5), drawing(20.0, 0.2, 0.7));
     let truth = a.transform_to(&b);
     // Half a metre along the corridor, which runs at -0.5 rad in map a, and a little across.
-    let mut first_guess = guess(truth, 0.5 * f64::cos(0.5) + 0.05, -0.5 * f64::sin(0.5), 0.01);
-    first_guess.covariance = Matrix3::from_diagonal(&Vector3::new(0.6 * 0.6, 0.6 * 0.6, 0.02 * 0.02));
-    let refinement = refine(&a.walls, &b.walls, &first_guess, &IcpParameters::default());
+    let mut initial_guess = guess(truth, 0.5 * f64::cos(0.5) + 0.05, -0.5 * f64::sin(0.5), 0.01);
+    initial_guess.covariance = Matrix3::from_diagonal(&Vector3::new(0.6 * 0.6, 0.6 * 0.6, 0.02 * 0.02));
+    let refinement = refine(&a.walls, &b.walls, &initial_guess, &IcpParameters::default());
     let registration = &refinement.registration;
     let along = Vector3::new(f64::cos(0.5), -f64::sin(0.5), 0.0);
     let across = Vector3::new(f64::sin(0.5), f64::cos(0.5), 0.0);
@@ -143,10 +143,10 @@ fn points_that_pull_on_points_do_not_close_a_bare_corridor() {
     let corridor = FloorPlan::corridor();
     let a = corridor.draw(seen(0.0, -1.5, 40.0, 1.5), drawing(0.0, 0.0, 0.5));
     let b = corridor.draw(seen(10.0, -1.5, 50.0, 1.5), drawing(20.0, 0.2, 0.7));
-    let mut first_guess = guess(a.transform_to(&b), 0.0, 0.0, 0.0);
-    first_guess.covariance = Matrix3::from_diagonal(&Vector3::new(0.6 * 0.6, 0.6 * 0.6, 0.02 * 0.02));
+    let mut initial_guess = guess(a.transform_to(&b), 0.0, 0.0, 0.0);
+    initial_guess.covariance = Matrix3::from_diagonal(&Vector3::new(0.6 * 0.6, 0.6 * 0.6, 0.02 * 0.02));
     let parameters = IcpParameters { metric: Metric::PointToPoint, max_iterations: 200, ..Default::default() };
-    let refinement = refine(&a.walls, &b.walls, &first_guess, &parameters);
+    let refinement = refine(&a.walls, &b.walls, &initial_guess, &parameters);
     assert!(matches!(refinement.refusal, Some(IcpRefusal::OpenPosition { .. })), "{}", refinement.reason());
 }
 
@@ -155,8 +155,8 @@ fn along_a_bare_corridor_a_good_first_guess_suffices() {
     let corridor = FloorPlan::corridor();
     let a = corridor.draw(seen(0.0, -1.5, 40.0, 1.5), drawing(0.0, 0.0, 0.5));
     let b = corridor.draw(seen(10.0, -1.5, 50.0, 1.5), drawing(20.0, 0.2, 0.7));
-    let mut first_guess = guess(a.transform_to(&b), 0.03, 0.02, 0.005);
-    first_guess.covariance = Matrix3::from_diagonal(&Vector3::new(0.05 * 0.05, 0.05 * 0.05, 0.01 * 0.01));
-    let refinement = refine(&a.walls, &b.walls, &first_guess, &IcpParameters::default());
+    let mut initial_guess = guess(a.transform_to(&b), 0.03, 0.02, 0.005);
+    initial_guess.covariance = Matrix3::from_diagonal(&Vector3::new(0.05 * 0.05, 0.05 * 0.05, 0.01 * 0.01));
+    let refinement = refine(&a.walls, &b.walls, &initial_guess, &IcpParameters::default());
     assert_eq!(refinement.refusal, None);
 }

@@ -2,7 +2,7 @@
 //! guesses change.
 
 use crate::registration::hypotheses::{HypothesisGatherer, Origin, has_covariance_of_fit};
-use crate::registration::icp::{FirstGuess, IcpParameters, IcpRefusal, Refinement, refine};
+use crate::registration::icp::{IcpParameters, IcpRefusal, InitialGuess, Refinement, refine};
 use crate::shared::geometry::{row_by_row, wrap_angle};
 use crate::shared::robot_maps::RobotMaps;
 use crate::shared::walls::WallsOnDemand;
@@ -125,7 +125,7 @@ impl IcpRefiner {
                     output.count("registrations", 1);
                     let [a, b] = [a, b].map(|map| map.walls(self.parameters.normal_radius));
                     let covariance = Matrix3::from_row_slice(&guess.covariance);
-                    let start = FirstGuess::new(guess.transform_a_b(), covariance, &self.parameters);
+                    let start = InitialGuess::new(guess.transform_a_b(), covariance, &self.parameters);
                     let mut refinement = refine(a, b, &start, &self.parameters);
                     if refinement.refusal.is_none() && has_covariance_of_fit(guess) {
                         refinement.refusal = IcpRefusal::of_search(&start, &refinement.registration, &self.parameters);

@@ -1,7 +1,7 @@
 //! The competition of the candidates for a pair of maps: how probable each is, and which of them is returned.
 
+use super::decision::{Decision, SecondBest};
 use super::priors::prior;
-use super::verdict::{SecondBest, Verdict};
 use super::{Candidate, JudgementParameters, Listed, Refusal, Term};
 use crate::registration::Basis;
 
@@ -38,21 +38,21 @@ impl Competition {
         self,
         asked: usize,
         deform: impl FnOnce(Candidate) -> Option<Candidate>,
-    ) -> Option<Verdict> {
+    ) -> Option<Decision> {
         let (count, listed) = (self.choices.len(), Listed::of(&self.choices));
         let mut weighed = self.candidates.into_iter().zip(self.probabilities);
         let Some(choice) = asked.checked_sub(1).and_then(|index| self.choices.into_iter().nth(index)) else {
             let (first, probability) = weighed.next()?;
             let refusal = Some(Refusal::NoSuchHypothesis { asked, count });
-            return Some(Verdict { refusal, listed, probability, ..Verdict::of(first) });
+            return Some(Decision { refusal, listed, probability, ..Decision::of(first) });
         };
         let (_, probability) = weighed.find(|(candidate, _)| candidate.has(choice.number))?;
         let chosen = Some((asked, count));
-        Some(Verdict { chosen, listed, probability, ..Verdict::of(deform(choice)?) })
+        Some(Decision { chosen, listed, probability, ..Decision::of(deform(choice)?) })
     }
 
     /// Judges the most probable candidate against all others. `None` if there is none that may be accepted.
-    pub(super) fn most_probable(self, parameters: &JudgementParameters) -> Option<Verdict> {
+    pub(super) fn most_probable(self, parameters: &JudgementParameters) -> Option<Decision> {
         let numbers = 0..self.candidates.len();
         let may_be_accepted = |number: &usize| !self.candidates[*number].hypothesis.is_alternative_only;
         let best = self.most_probable_of(numbers.clone().filter(may_be_accepted))?;
@@ -65,9 +65,9 @@ impl Competition {
         let listed = Listed::of(&self.choices);
         let candidate = self.candidates.into_iter().nth(best)?;
         let prior = prior(&candidate, self.is_expected);
-        let mut verdict = Verdict { probability, second_best, listed, prior, ..Verdict::of(candidate) };
-        verdict.refusal = refusal(&verdict, of_others, parameters);
-        Some(verdict)
+        let mut decision = Decision { probability, second_best, listed, prior, ..Decision::of(candidate) };
+        decision.refusal = refusal(&decision, of_others, parameters);
+        Some(decision)
     }
 
     /// The number with the highest log-odds; of equals the first.
@@ -100,11 +100,11 @@ fn log_odds(candidate: &Candidate, is_expected: bool) -> f64 {
     candidate.terms().log_odds() + prior(candidate, is_expected)
 }
 
-/// Why a verdict is refused, where one of all other candidates is right with a probability; none if it is as probable
+/// Why a decision is refused, where one of all other candidates is right with a probability; none if it is as probable
 /// as required.
-fn refusal(verdict: &Verdict, of_others: f64, parameters: &JudgementParameters) -> Option<Refusal> {
+fn refusal(decision: &Decision, of_others: f64, parameters: &JudgementParameters) -> Option<Refusal> {
     let JudgementParameters { accept, max_bend: most, .. } = *parameters;
-    let Verdict { candidate, probability, second_best, .. } = verdict;
+    let Decision { candidate, probability, second_best, .. } = decision;
     if candidate.hypothesis.is_refused {
         return Some(Refusal::RefusedUpstream(candidate.hypothesis.reason.clone()));
     }
@@ -126,12 +126,12 @@ fn refusal(verdict: &Verdict, of_others: f64, parameters: &JudgementParameters) 
                 here: candidate.agreement.inlier_length,
             },
             false => {
-                Refusal::Ambiguous { shift, turn, probability: second.probability, listed: verdict.listed.clone() }
+                Refusal::Ambiguous { shift, turn, probability: second.probability, listed: decision.listed.clone() }
             }
         });
     }
     let agreement = candidate.agreement;
-    Some(match verdict.weakest_term() {
+    Some(match decision.weakest_term() {
         Term::ConflictingWalls => Refusal::Contradiction { agreement },
         Term::ShortSegments if agreement.details.contradict() => Refusal::Contradiction { agreement },
         weakest => Refusal::Chance { agreement, weakest, probability: *probability, accept },

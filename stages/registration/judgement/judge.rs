@@ -1,7 +1,7 @@
 //! Decides which of all hypotheses for a pair of maps is right, if any.
 
 use super::competition::Competition;
-use super::{Candidate, Comparisons, JudgementParameters, Refusal, Verdict};
+use super::{Candidate, Comparisons, Decision, JudgementParameters, Refusal};
 use crate::registration::comparison::{ComparisonParameters, MapView};
 use crate::registration::pose_window::PoseWindow;
 use crate::registration::{Basis, Hypothesis};
@@ -28,7 +28,7 @@ pub fn judge(
     hypotheses: &[Hypothesis],
     known: &UserKnowledge,
     parameters: &JudgementParameters,
-) -> Option<Verdict> {
+) -> Option<Decision> {
     judge_again(a, b, hypotheses, known, parameters, &mut Comparisons::default())
 }
 
@@ -40,13 +40,13 @@ pub fn judge_again(
     known: &UserKnowledge,
     parameters: &JudgementParameters,
     comparisons: &mut Comparisons,
-) -> Option<Verdict> {
+) -> Option<Decision> {
     comparisons.begin();
     let comparison = parameters.comparison();
     let all = compared(a, b, hypotheses, &comparison, comparisons);
     let choices = match competing(all, known.window.as_ref()) {
         Ok(choices) => choices,
-        Err(verdict) => return Some(*verdict),
+        Err(decision) => return Some(*decision),
     };
     let candidates = deformed(choices.clone(), a, b, &comparison, comparisons);
     let competition = Competition::new(choices, candidates, known.window.is_some());
@@ -58,8 +58,8 @@ pub fn judge_again(
     }
 }
 
-/// The candidates that the initial poses allow; if these allow none, the verdict on the best of all.
-fn competing(all: Vec<Candidate>, window: Option<&PoseWindow>) -> Result<Vec<Candidate>, Box<Verdict>> {
+/// The candidates that the initial poses allow; if these allow none, the decision on the best of all.
+fn competing(all: Vec<Candidate>, window: Option<&PoseWindow>) -> Result<Vec<Candidate>, Box<Decision>> {
     let Some(window) = window else { return Ok(merged(all)) };
     let is_possible = |candidate: &Candidate| window.contains(&candidate.hypothesis.transform_a_b, 0.0, 0.0);
     let (possible, others): (Vec<Candidate>, Vec<Candidate>) = all.into_iter().partition(is_possible);
@@ -134,12 +134,12 @@ fn merged(all: Vec<Candidate>) -> Vec<Candidate> {
     distinct
 }
 
-/// Verdict on a candidate that the initial poses do not allow.
-fn unexpected(candidate: Candidate, window: &PoseWindow) -> Verdict {
+/// Decision on a candidate that the initial poses do not allow.
+fn unexpected(candidate: Candidate, window: &PoseWindow) -> Decision {
     let (shift, turn) = window.change(&candidate.hypothesis.transform_a_b);
     let refusal = match candidate.hypothesis.is_refused {
         false => Refusal::OutsideWindow { shift, turn: turn.to_degrees() },
         true => Refusal::RefusedUpstream(candidate.hypothesis.reason.clone()),
     };
-    Verdict { refusal: Some(refusal), ..Verdict::of(candidate) }
+    Decision { refusal: Some(refusal), ..Decision::of(candidate) }
 }

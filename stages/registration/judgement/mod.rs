@@ -12,13 +12,13 @@
 mod candidate;
 mod comparisons;
 mod competition;
+mod decision;
 mod judge;
 mod parameters;
 mod priors;
 mod refusal;
 mod self_similarity;
 mod terms;
-mod verdict;
 pub mod weights;
 
 #[cfg(test)]
@@ -27,9 +27,9 @@ mod tests;
 pub use candidate::Candidate;
 pub use comparisons::Comparisons;
 pub use competition::posterior;
+pub use decision::Decision;
 pub use judge::{UserKnowledge, candidates, judge, judge_again};
 pub use parameters::JudgementParameters;
 pub use refusal::{Listed, Refusal};
 pub use self_similarity::{Alias, SelfSimilarity};
 pub use terms::{COUNT, Term, Terms};
-pub use verdict::Verdict;

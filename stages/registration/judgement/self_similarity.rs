@@ -15,9 +15,9 @@
 //!   is less.
 
 use super::weights::ALIAS;
-use super::{JudgementParameters, Verdict};
+use super::{Decision, JudgementParameters};
 use crate::registration::comparison::{Agreement, MapView, compare, overlap};
-use crate::registration::icp::{FirstGuess, IcpParameters, refine};
+use crate::registration::icp::{IcpParameters, InitialGuess, refine};
 use crate::registration::pose_window::PoseWindow;
 use crate::registration::search::{CommonWalls, MapAlignerParameters, PreparedMap, self_similar_poses};
 use crate::shared::geometry::Pose2;
@@ -87,34 +87,34 @@ pub struct Alias {
 impl Alias {
     /// The most probable alias of an accepted pose; none if neither map is self-similar.
     pub fn likeliest(
-        verdict: &Verdict,
+        decision: &Decision,
         a: (&MapView<'_>, &SelfSimilarity),
         b: (&MapView<'_>, &SelfSimilarity),
         window: Option<&PoseWindow>,
         parameters: &JudgementParameters,
     ) -> Option<Self> {
-        let all = Self::all(verdict, a, b, window, parameters).into_iter();
+        let all = Self::all(decision, a, b, window, parameters).into_iter();
         all.max_by(|one, other| one.log_odds.total_cmp(&other.log_odds))
     }
 
     /// All aliases of a pose, or those in a window. Each map is given with its self-similarity.
     pub fn all(
-        verdict: &Verdict,
+        decision: &Decision,
         (a, similar_a): (&MapView<'_>, &SelfSimilarity),
         (b, similar_b): (&MapView<'_>, &SelfSimilarity),
         window: Option<&PoseWindow>,
         parameters: &JudgementParameters,
     ) -> Vec<Self> {
-        let (place, here) = (verdict.candidate.transform_a_b(), verdict.candidate.agreement);
+        let (place, here) = (decision.candidate.transform_a_b(), decision.candidate.agreement);
         let by_a = similar_a.poses.iter().map(|(change, itself)| (change * place, itself));
         let by_b = similar_b.poses.iter().map(|(change, itself)| (place * change, itself));
         let alias = |(guess, itself): (Pose2, &Agreement)| {
             let transform_a_b = registered(a.walls, b.walls, &guess);
             let is_possible = window.is_none_or(|window| window.contains(&transform_a_b, 0.0, 0.0));
-            if !is_possible || verdict.candidate.is_at(&transform_a_b) {
+            if !is_possible || decision.candidate.is_at(&transform_a_b) {
                 return None;
             }
-            let (shift, turn) = verdict.candidate.change(&transform_a_b);
+            let (shift, turn) = decision.candidate.change(&transform_a_b);
             let there = compare(a, b, &transform_a_b, &parameters.comparison());
             if !is_alike(&there) {
                 return None;
@@ -152,7 +152,7 @@ fn by_details(agreement: &Agreement) -> f64 {
 /// Pose near a guess at which the walls of the maps are aligned.
 fn registered(a: &WallMap, b: &WallMap, guess: &Pose2) -> Pose2 {
     let icp = IcpParameters::default();
-    refine(a, b, &FirstGuess::new(*guess, Matrix3::zeros(), &icp), &icp).registration.transform_a_b
+    refine(a, b, &InitialGuess::new(*guess, Matrix3::zeros(), &icp), &icp).registration.transform_a_b
 }
 
 /// Log-likelihood ratio of two explanations of the conflicts: those `here` are noise and those `there` are as
@@ -205,7 +205,7 @@ mod tests {
         (west, plan.draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1)))
     }
 
-    /// The verdict on a pose with a significant peak, first without its alias, and then with it.
+    /// The decision on a pose with a significant peak, first without its alias, and then with it.
     fn judged(a: &DrawnMap, b: &DrawnMap, place: &Pose2, window: Option<&PoseWindow>) -> [Option<Refusal>; 2] {
         let hypothesis = Hypothesis {
             transform_a_b: *place,
@@ -218,12 +218,12 @@ mod tests {
         };
         let parameters = JudgementParameters::default();
         let (a, b) = (a.view(), b.view());
-        let verdict = judge(&a, &b, &[hypothesis], &UserKnowledge::default(), &parameters).unwrap();
-        let alone = verdict.refusal.clone();
-        assert_eq!(verdict.rests_on_maps_alone(), alone.is_none());
+        let decision = judge(&a, &b, &[hypothesis], &UserKnowledge::default(), &parameters).unwrap();
+        let alone = decision.refusal.clone();
+        assert_eq!(decision.rests_on_maps_alone(), alone.is_none());
         let [similar_a, similar_b] = [&a, &b].map(|map| SelfSimilarity::new(map, &parameters));
-        let alias = Alias::likeliest(&verdict, (&a, &similar_a), (&b, &similar_b), window, &parameters);
-        [alone, verdict.against(alias.as_ref(), &parameters).refusal]
+        let alias = Alias::likeliest(&decision, (&a, &similar_a), (&b, &similar_b), window, &parameters);
+        [alone, decision.against(alias.as_ref(), &parameters).refusal]
     }
 
     /// Half a turn about the middle of the buildings.

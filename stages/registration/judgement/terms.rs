@@ -49,7 +49,7 @@ impl Term {
         Self::Deformation,
     ];
 
-    /// Name in the explanation of a verdict and in the tables of the fit.
+    /// Name in the explanation of a decision and in the tables of the fit.
     pub fn name(self) -> &'static str {
         match self {
             Self::PeakSignificance => "peak significance",

@@ -1,6 +1,6 @@
 //! Comparison and judgement on drawn floor plans.
 
-use super::{JudgementParameters, Refusal, UserKnowledge, Verdict, judge};
+use super::{Decision, JudgementParameters, Refusal, UserKnowledge, judge};
 use crate::registration::comparison::compare;
 use crate::registration::pose_window::PoseWindow;
 use crate::registration::{Basis, Hypothesis};
@@ -54,16 +54,16 @@ fn by_maps_alike(poses: &[Pose2]) -> Vec<Hypothesis> {
     by_maps(poses).into_iter().enumerate().map(alike).collect()
 }
 
-fn judged(a: &DrawnMap, b: &DrawnMap, hypotheses: &[Hypothesis]) -> Verdict {
+fn judged(a: &DrawnMap, b: &DrawnMap, hypotheses: &[Hypothesis]) -> Decision {
     judged_knowing(a, b, hypotheses, &UserKnowledge::default())
 }
 
-fn judged_knowing(a: &DrawnMap, b: &DrawnMap, hypotheses: &[Hypothesis], known: &UserKnowledge) -> Verdict {
+fn judged_knowing(a: &DrawnMap, b: &DrawnMap, hypotheses: &[Hypothesis], known: &UserKnowledge) -> Decision {
     judge(&a.view(), &b.view(), hypotheses, known, &JudgementParameters::default()).unwrap()
 }
 
-fn reason(verdict: &Verdict) -> String {
-    verdict.reason(JudgementParameters::default().accept, "verifier", "robot1", "robot2")
+fn reason(decision: &Decision) -> String {
+    decision.reason(JudgementParameters::default().accept, "verifier", "robot1", "robot2")
 }
 
 #[test]
@@ -74,17 +74,17 @@ fn a_deformed_map_is_compared_with_its_deformation_and_its_pose_is_the_nearest_r
     // Where one part of it fits, and where another does.
     let maps = by_maps(&[pose(-0.65, -0.9, 0.0), pose(-0.75, 0.0, -0.04)]);
     let rigid = JudgementParameters { bend: 0.0, ..Default::default() };
-    let verdict = judge(&a.view(), &b.view(), &maps, &UserKnowledge::default(), &rigid).unwrap();
-    assert!(verdict.refusal.is_some(), "{}", reason(&verdict));
-    let verdict = judged(&a, &b, &maps);
-    assert_eq!(verdict.refusal, None, "{}", reason(&verdict));
-    assert!(reason(&verdict).contains("with a deformation of 0.4"), "{}", reason(&verdict));
-    let deformed = verdict.candidate.deformed.unwrap();
+    let decision = judge(&a.view(), &b.view(), &maps, &UserKnowledge::default(), &rigid).unwrap();
+    assert!(decision.refusal.is_some(), "{}", reason(&decision));
+    let decision = judged(&a, &b, &maps);
+    assert_eq!(decision.refusal, None, "{}", reason(&decision));
+    assert!(reason(&decision).contains("with a deformation of 0.4"), "{}", reason(&decision));
+    let deformed = decision.candidate.deformed.unwrap();
     assert!(deformed.agreement.inlier_ratio() > 0.95 && deformed.cost > 1.0, "{deformed:?}");
     for (allowed, is_refused) in [(deformed.rms - 0.006, true), (deformed.rms - 0.004, false)] {
         let parameters = JudgementParameters { max_bend: allowed, ..Default::default() };
-        let verdict = judge(&a.view(), &b.view(), &maps, &UserKnowledge::default(), &parameters).unwrap();
-        assert_eq!(verdict.refusal.is_some(), is_refused, "{allowed}: {}", reason(&verdict));
+        let decision = judge(&a.view(), &b.view(), &maps, &UserKnowledge::default(), &parameters).unwrap();
+        assert_eq!(decision.refusal.is_some(), is_refused, "{allowed}: {}", reason(&decision));
     }
     let poses: Vec<Point2> =
         (1..20).flat_map(|x| (1..12).map(move |y| Point2::new(f64::from(x), f64::from(y)))).collect();
@@ -106,8 +106,8 @@ fn the_map_of_another_building_is_not_deformed_to_fit() {
     let b = FloorPlan::another_office().draw(part, drawing(0.0, 0.0, 0.0));
     for place in [pose(1.5, 0.0, 0.0), pose(-3.0, 1.0, 0.1), pose(12.0, 0.0, PI / 2.0)] {
         let maps = by_maps(&[place]);
-        let verdict = judged(&a, &b, &maps);
-        assert!(verdict.refusal.is_some(), "{}", reason(&verdict));
+        let decision = judged(&a, &b, &maps);
+        assert!(decision.refusal.is_some(), "{}", reason(&decision));
     }
 }
 
@@ -121,8 +121,8 @@ fn maps_with_many_conflicts_are_merged_where_tags_and_a_search_agree() {
     let b = FloorPlan::office().with(&after).draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(12.0, 6.0, -2.1));
     let truth = a.transform_to(&b);
     let tags = by_tags(&truth);
-    let verdict = judged(&a, &b, std::slice::from_ref(&tags));
-    assert!(matches!(verdict.refusal, Some(Refusal::Contradiction { .. })), "{}", reason(&verdict));
+    let decision = judged(&a, &b, std::slice::from_ref(&tags));
+    assert!(matches!(decision.refusal, Some(Refusal::Contradiction { .. })), "{}", reason(&decision));
     let maps = by_maps(&[truth, pose(4.0, 0.0, 0.0) * truth]);
     let together = [std::slice::from_ref(&tags), &maps].concat();
     assert_eq!(judged(&a, &b, &together).refusal, None);
@@ -139,8 +139,8 @@ fn a_refused_hypothesis_is_not_accepted_but_competes() {
     let mut maps = by_maps_alike(&[truth, pose(0.0, 0.0, PI) * truth]);
     maps[0].is_refused = true;
     maps[0].reason = "ICP has not settled".into();
-    let verdict = judged(&a, &b, &maps);
-    assert_eq!(reason(&verdict), "ICP has not settled");
+    let decision = judged(&a, &b, &maps);
+    assert_eq!(reason(&decision), "ICP has not settled");
     let (known, parameters) = (UserKnowledge::default(), JudgementParameters::default());
     assert!(judge(&a.view(), &b.view(), &[], &known, &parameters).is_none());
 }
@@ -194,8 +194,8 @@ fn acceptance_follows_from_the_required_probability() {
     let hypotheses = by_maps(&[a.transform_to(&b)]);
     for (accept, is_accepted) in [(0.0, true), (0.98, true), (1.0, false)] {
         let parameters = JudgementParameters { accept, ..Default::default() };
-        let verdict = judge(&a.view(), &b.view(), &hypotheses, &UserKnowledge::default(), &parameters).unwrap();
-        assert_eq!(verdict.refusal.is_none(), is_accepted, "{accept}: {}", reason(&verdict));
+        let decision = judge(&a.view(), &b.view(), &hypotheses, &UserKnowledge::default(), &parameters).unwrap();
+        assert_eq!(decision.refusal.is_none(), is_accepted, "{accept}: {}", reason(&decision));
     }
 }
 
@@ -210,8 +210,8 @@ fn the_wrong_quarter_is_refused() {
             by_maps(&[a.transform_to(&b)]).into_iter().map(|one| Hypothesis { is_alternative_only: true, ..one });
         let wrong = by_tags(&(pose(0.0, 0.0, turn) * a.transform_to(&b)));
         let hypotheses: Vec<Hypothesis> = std::iter::once(wrong).chain(found).collect();
-        let verdict = judged(&a, &b, &hypotheses);
-        assert!(verdict.refusal.is_some(), "{turn}: {}", reason(&verdict));
+        let decision = judged(&a, &b, &hypotheses);
+        assert!(decision.refusal.is_some(), "{turn}: {}", reason(&decision));
     }
 }
 
@@ -244,13 +244,13 @@ fn an_initial_pose_decides_between_poses_that_fit_equally_well() {
     let hypotheses = by_maps_alike(&poses);
     assert!(matches!(judged(&a, &b, &hypotheses).refusal, Some(Refusal::Ambiguous { .. })));
     for (rank, place) in (0..).zip(&poses) {
-        let verdict = judged_knowing(&a, &b, &hypotheses, &window_at(place));
-        assert_eq!((verdict.refusal.clone(), verdict.candidate.number), (None, rank), "{}", reason(&verdict));
+        let decision = judged_knowing(&a, &b, &hypotheses, &window_at(place));
+        assert_eq!((decision.refusal.clone(), decision.candidate.number), (None, rank), "{}", reason(&decision));
     }
     let elsewhere = window_at(&(pose(5.0, 0.0, 0.0) * poses[0]));
-    let verdict = judged_knowing(&a, &b, &hypotheses[..1], &elsewhere);
-    assert!(matches!(verdict.refusal, Some(Refusal::OutsideWindow { shift, .. }) if (shift - 5.0).abs() < 1.0));
-    assert!(reason(&verdict).contains("from the initial poses only\ntry: "), "{}", reason(&verdict));
+    let decision = judged_knowing(&a, &b, &hypotheses[..1], &elsewhere);
+    assert!(matches!(decision.refusal, Some(Refusal::OutsideWindow { shift, .. }) if (shift - 5.0).abs() < 1.0));
+    assert!(reason(&decision).contains("from the initial poses only\ntry: "), "{}", reason(&decision));
 }
 
 #[test]
@@ -262,11 +262,11 @@ fn a_hypothesis_that_was_listed_can_be_chosen() {
     assert_eq!(listed.len(), 2);
     for (number, place) in (1..).zip(listed) {
         let known = UserKnowledge { hypothesis: Some(number), ..UserKnowledge::default() };
-        let verdict = judged_knowing(&a, &b, &hypotheses, &known);
-        assert_eq!(verdict.refusal, None);
-        let translation = verdict.candidate.hypothesis.transform_a_b.translation;
+        let decision = judged_knowing(&a, &b, &hypotheses, &known);
+        assert_eq!(decision.refusal, None);
+        let translation = decision.candidate.hypothesis.transform_a_b.translation;
         assert_eq!((place.x, place.y), (translation.x, translation.y));
-        assert!(reason(&verdict).starts_with(&format!("hypothesis {number} of 2, chosen by the user")));
+        assert!(reason(&decision).starts_with(&format!("hypothesis {number} of 2, chosen by the user")));
     }
     let known = UserKnowledge { hypothesis: Some(3), ..UserKnowledge::default() };
     let refusal = judged_knowing(&a, &b, &hypotheses, &known).refusal;
@@ -277,8 +277,8 @@ fn a_hypothesis_that_was_listed_can_be_chosen() {
 fn hypotheses_are_listed_by_their_probability() {
     let (a, b, [one, other]) = ambiguous();
     for (probable, less) in [(one, other), (other, one)] {
-        let verdict = judged(&a, &b, &by_maps_alike(&[probable, less]));
-        let first = verdict.listed.0[0];
+        let decision = judged(&a, &b, &by_maps_alike(&[probable, less]));
+        let first = decision.listed.0[0];
         assert_eq!((first.x, first.y), (probable.translation.x, probable.translation.y));
     }
 }

@@ -1,7 +1,6 @@
 //! The stage from outside: messages in, messages out.
 
-use crate::registration::search::tests::angular_office;
-use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
+use crate::shared::test_world::floor_plan::{FloorPlan, apart, drawing, seen};
 use crate::shared::test_world::stage_bench::StageBench;
 use gridweave_runtime::stage::{Context, InitialPose, InitialPoses};
 

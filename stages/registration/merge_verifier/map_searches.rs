@@ -2,7 +2,7 @@
 
 use super::numbered_map::NumberedMap;
 use crate::registration::icp::IcpParameters;
-use crate::registration::judgement::{UserKnowledge, Verdict};
+use crate::registration::judgement::{Decision, UserKnowledge};
 use crate::registration::search::MapAlignerParameters;
 use crate::registration::{Basis, Hypothesis, PreparedPair};
 use crate::shared::robot_pair::RobotPair;
@@ -25,12 +25,12 @@ struct Searched {
 impl MapSearches {
     /// Whether a search is needed: no source has looked whether the maps fit elsewhere as well, and no hypothesis has
     /// both enough tags and a high inlier ratio.
-    pub(super) fn is_due(hypotheses: &[Hypothesis], verdict: &Verdict) -> bool {
+    pub(super) fn is_due(hypotheses: &[Hypothesis], decision: &Decision) -> bool {
         let usable = || hypotheses.iter().filter(|hypothesis| !hypothesis.is_refused);
         let is_by_search = |hypothesis: &Hypothesis| matches!(hypothesis.basis, Basis::Search { .. });
-        let is_clear = verdict.candidate.agreement.inlier_ratio() >= CLEAR_AGREEMENT
+        let is_clear = decision.candidate.agreement.inlier_ratio() >= CLEAR_AGREEMENT
             && usable().any(|hypothesis| hypothesis.basis == Basis::Tags);
-        usable().next().is_some() && !usable().any(is_by_search) && !is_clear && verdict.chosen.is_none()
+        usable().next().is_some() && !usable().any(is_by_search) && !is_clear && decision.chosen.is_none()
     }
 
     /// Peaks of the search of two maps.

@@ -1,18 +1,18 @@
-//! What is sent of a verdict: the alignment with its reason, and the evidence.
+//! What is sent of a decision: the alignment with its reason, and the evidence.
 
 use crate::registration::Hypothesis;
 use crate::registration::comparison::{Agreement, Deformed};
-use crate::registration::judgement::Verdict;
+use crate::registration::judgement::Decision;
 use crate::registration::scale::Scale;
 use crate::shared::geometry::row_by_row;
 use crate::shared::robot_pair::RobotPair;
 use gridweave_runtime::ros::{Alignment, Evidence, Header};
 use nalgebra::Matrix3;
 
-/// Evidence of a verdict on a pair, with the number of hypotheses, without a header.
-pub(super) fn evidence(verdict: &Verdict, pair: &RobotPair, hypotheses: usize) -> Evidence {
-    let Agreement { overlap, inlier_length, conflict_length, evidence, .. } = verdict.candidate.agreement;
-    let elsewhere = verdict.second_best.as_ref().map_or(0.0, |second| second.agreement.evidence.max(0.0));
+/// Evidence of a decision on a pair, with the number of hypotheses, without a header.
+pub(super) fn evidence(decision: &Decision, pair: &RobotPair, hypotheses: usize) -> Evidence {
+    let Agreement { overlap, inlier_length, conflict_length, evidence, .. } = decision.candidate.agreement;
+    let elsewhere = decision.second_best.as_ref().map_or(0.0, |second| second.agreement.evidence.max(0.0));
     Evidence {
         header: Header::default(),
         a: pair.a.clone(),
@@ -25,16 +25,16 @@ pub(super) fn evidence(verdict: &Verdict, pair: &RobotPair, hypotheses: usize) -
     }
 }
 
-/// Alignment of a verdict on hypotheses, of which those with a pose were judged, in their order.
-pub(super) fn judged(verdict: &Verdict, proposed: &[&Alignment], reason: String) -> Alignment {
-    let accepted = verdict.refusal.is_none();
-    let source = &verdict.candidate.hypothesis.source;
+/// Alignment of a decision on hypotheses, of which those with a pose were judged, in their order.
+pub(super) fn judged(decision: &Decision, proposed: &[&Alignment], reason: String) -> Alignment {
+    let accepted = decision.refusal.is_none();
+    let source = &decision.candidate.hypothesis.source;
     let mut judged = proposed.iter().filter(|alignment| Hypothesis::of(alignment).is_some());
-    let mut alignment = judged.nth(verdict.candidate.number).map_or_else(Alignment::default, |one| (*one).clone());
-    if let Some(Deformed { transform_a_b, .. }) = &verdict.candidate.deformed {
+    let mut alignment = judged.nth(decision.candidate.number).map_or_else(Alignment::default, |one| (*one).clone());
+    if let Some(Deformed { transform_a_b, .. }) = &decision.candidate.deformed {
         alignment.set_transform_a_b(transform_a_b);
     }
-    if let Some(covariance) = &verdict.candidate.left_by_deformation {
+    if let Some(covariance) = &decision.candidate.left_by_deformation {
         alignment.covariance = row_by_row(&(Matrix3::from_row_slice(&alignment.covariance) + covariance));
     }
     Alignment {
@@ -42,13 +42,13 @@ pub(super) fn judged(verdict: &Verdict, proposed: &[&Alignment], reason: String)
         provisional: false,
         rank: 0,
         hypotheses: 0,
-        score: verdict.probability,
+        score: decision.probability,
         reason: if accepted { reason } else { with_other_sources(reason, source, proposed) },
         ..alignment
     }
 }
 
-/// Verdict for a pair without a pose.
+/// Decision for a pair without a pose.
 pub(super) fn refused(proposed: &[&Alignment]) -> Alignment {
     let Some(first) = proposed.first() else { return Alignment::default() };
     let reason = with_other_sources(first.reason.clone(), &first.source, proposed);
@@ -58,9 +58,9 @@ pub(super) fn refused(proposed: &[&Alignment]) -> Alignment {
 /// First paragraph of the reason for a pair whose maps agree at another scale, where the cells of map b are `cell`
 /// metres wide by its resolution.
 pub(super) fn scale_reason(scale: &Scale, pair: &RobotPair, cell: f64) -> String {
-    let Scale { factor, verdict } = scale;
+    let Scale { factor, decision } = scale;
     let RobotPair { a, b } = pair;
-    let Agreement { inlier_length, conflict_length, .. } = verdict.candidate.agreement;
+    let Agreement { inlier_length, conflict_length, .. } = decision.candidate.agreement;
     format!(
         "the maps may fit if {b} is {factor:.3} times as large: {inlier_length:.0} m of wall agree, {conflict_length:.0} m do not\n\
          missing: the right resolution of {b}, or of {a}\n\

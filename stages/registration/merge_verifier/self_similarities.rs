@@ -2,7 +2,7 @@
 
 use super::numbered_map::NumberedMap;
 use crate::registration::comparison::Agreement;
-use crate::registration::judgement::{Alias, JudgementParameters, SelfSimilarity, Verdict};
+use crate::registration::judgement::{Alias, Decision, JudgementParameters, SelfSimilarity};
 use crate::registration::pose_window::PoseWindow;
 use crate::shared::geometry::{Pose2, is_known};
 use crate::shared::robot_pair::RobotPair;
@@ -42,7 +42,7 @@ impl SelfSimilarities {
     /// The most probable alias of a pose that was accepted by the maps only; searches the maps if necessary.
     pub(super) fn alias(
         &mut self,
-        verdict: &Verdict,
+        decision: &Decision,
         pair: &RobotPair,
         [a, b]: &[NumberedMap<'_>; 2],
         window: Option<&PoseWindow>,
@@ -51,7 +51,7 @@ impl SelfSimilarities {
         self.search(&pair.a, a, parameters);
         self.search(&pair.b, b, parameters);
         let (of_a, of_b) = (self.searched.get(&pair.a)?, self.searched.get(&pair.b)?);
-        let candidate = &verdict.candidate;
+        let candidate = &decision.candidate;
         let asked = Asked {
             maps: [a.number, b.number, of_a.number, of_b.number],
             transform_a_b: candidate.transform_a_b(),
@@ -61,7 +61,7 @@ impl SelfSimilarities {
         if let Some((_, alias)) = self.aliases.get(pair).filter(|(known, _)| *known == asked) {
             return alias.clone();
         }
-        let alias = Alias::likeliest(verdict, (&a.view, &of_a.found), (&b.view, &of_b.found), window, parameters);
+        let alias = Alias::likeliest(decision, (&a.view, &of_a.found), (&b.view, &of_b.found), window, parameters);
         self.aliases.insert(pair.clone(), (asked, alias.clone()));
         alias
     }

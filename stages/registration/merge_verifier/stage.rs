@@ -6,7 +6,7 @@ use super::messages::{evidence, judged, refused, scale_reason};
 use super::numbered_map::NumberedMap;
 use super::self_similarities::SelfSimilarities;
 use crate::registration::hypotheses::{HypothesisGatherer, Origin};
-use crate::registration::judgement::{Comparisons, JudgementParameters, UserKnowledge, Verdict, judge_again};
+use crate::registration::judgement::{Comparisons, Decision, JudgementParameters, UserKnowledge, judge_again};
 use crate::registration::scale::{LEAST_PROBABILITY, Scale};
 use crate::registration::{Hypothesis, RegistrationParameters};
 use crate::shared::robot_maps::RobotMaps;
@@ -172,7 +172,7 @@ impl MergeVerifier {
         self.hypotheses.keys()
     }
 
-    /// Judges a pair, and publishes the verdict. A pair that waits for a map is judged once that has come.
+    /// Judges a pair, and publishes the decision. A pair that waits for a map is judged once that has come.
     fn update(&mut self, pair: &RobotPair, output: &Output<Judgements>) -> Result<(), StageError> {
         let known = self.knowledge.of(pair, self.maps.iter().count());
         let proposed = proposed(&self.hypotheses, pair);
@@ -183,13 +183,13 @@ impl MergeVerifier {
         if maps.is_none() && proposed.iter().any(|alignment| alignment.accepted) {
             return Ok(());
         }
-        let verdict = self.judge_pair(pair, &known);
-        self.publish(pair, verdict.as_ref(), output)
+        let decision = self.judge_pair(pair, &known);
+        self.publish(pair, decision.as_ref(), output)
     }
 
     /// Judges the hypotheses of a pair, with those of a search if that is due, and against self-similarity of the maps
     /// if nothing but the maps confirms them. `None` without both maps, or without hypotheses.
-    fn judge_pair(&mut self, pair: &RobotPair, known: &UserKnowledge) -> Option<Verdict> {
+    fn judge_pair(&mut self, pair: &RobotPair, known: &UserKnowledge) -> Option<Decision> {
         let (a, b) = self.maps.pair(pair)?;
         let maps = [NumberedMap::of(a), NumberedMap::of(b)];
         let proposed = proposed(&self.hypotheses, pair);
@@ -201,34 +201,34 @@ impl MergeVerifier {
         let [view_a, view_b] = maps.each_ref().map(|map| &map.view);
         let mut judge =
             |hypotheses: &[Hypothesis]| judge_again(view_a, view_b, hypotheses, known, &self.parameters, comparisons);
-        let mut verdict = judge(&hypotheses)?;
-        if MapSearches::is_due(&hypotheses, &verdict) {
+        let mut decision = judge(&hypotheses)?;
+        if MapSearches::is_due(&hypotheses, &decision) {
             hypotheses.extend_from_slice(self.map_searches.of(pair, &maps, known));
-            verdict = judge(&hypotheses)?;
+            decision = judge(&hypotheses)?;
         }
-        if !verdict.rests_on_maps_alone() {
-            return Some(verdict);
+        if !decision.rests_on_maps_alone() {
+            return Some(decision);
         }
-        let alias = self.self_similarities.alias(&verdict, pair, &maps, known.window.as_ref(), &self.parameters);
-        Some(verdict.against(alias.as_ref(), &self.parameters))
+        let alias = self.self_similarities.alias(&decision, pair, &maps, known.window.as_ref(), &self.parameters);
+        Some(decision.against(alias.as_ref(), &self.parameters))
     }
 
-    /// Sends the verdict on a pair and its evidence if they have changed; without a verdict a refusal.
+    /// Sends the decision on a pair and its evidence if they have changed; without a decision a refusal.
     fn publish(
         &mut self,
         pair: &RobotPair,
-        verdict: Option<&Verdict>,
+        decision: Option<&Decision>,
         output: &Output<Judgements>,
     ) -> Result<(), StageError> {
         self.other_scales.remove(pair);
         let proposed = proposed(&self.hypotheses, pair);
-        let Some(verdict) = verdict else { return self.send(pair, refused(&proposed), output) };
-        if let Some(scale) = verdict.other_scale() {
+        let Some(decision) = decision else { return self.send(pair, refused(&proposed), output) };
+        if let Some(scale) = decision.other_scale() {
             self.other_scales.insert(pair.clone(), scale);
         }
-        let evidence = evidence(verdict, pair, proposed.len());
-        let reason = verdict.reason(self.parameters.accept, &self.name, &pair.a, &pair.b);
-        let alignment = judged(verdict, &proposed, reason);
+        let evidence = evidence(decision, pair, proposed.len());
+        let reason = decision.reason(self.parameters.accept, &self.name, &pair.a, &pair.b);
+        let alignment = judged(decision, &proposed, reason);
         if self.evidence.get(pair) != Some(&evidence) {
             let header = Header::new(output.log_time(), alignment.header.frame_id.clone());
             output.evidence.send("", &Evidence { header, ..evidence.clone() })?;

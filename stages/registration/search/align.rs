@@ -126,7 +126,7 @@ pub fn peak_significance(a: &PreparedMap, b: &PreparedMap, parameters: &MapAlign
     let peaks = Peaks::find(a, b, Extent::All, parameters);
     let Some(best) = peaks.all().first() else { return 0.0 };
     let best = hypotheses(&peaks, best.score, a, b, parameters).into_iter().next();
-    let is_enough = |found: &Hypothesis| found.alignment.wall_in_common >= parameters.min_wall_length;
+    let is_enough = |found: &RefinedPeak| found.alignment.wall_in_common >= parameters.min_wall_length;
     best.filter(is_enough).map_or(0.0, |found| found.alignment.significance)
 }
 
@@ -163,7 +163,7 @@ pub fn align_near(
     let judged = overlay(a, b, JUDGED, parameters.free_space_penalty);
     let common = judged.common_walls(transform_a_b)?;
     let peak = ScoredPose { transform_a_b: *transform_a_b, score: judged.faced_score(transform_a_b) };
-    let mut near = Hypothesis::at(&peak, 1.0, &common, a, b, parameters)?.alignment;
+    let mut near = RefinedPeak::at(&peak, 1.0, &common, a, b, parameters)?.alignment;
     near.score = judged.faced_score(&near.transform_a_b);
     near.share = 1.0;
     (near.significance, near.margin) = (found.significance, found.margin);
@@ -177,7 +177,7 @@ fn hypotheses(
     a: &PreparedMap,
     b: &PreparedMap,
     parameters: &MapAlignerParameters,
-) -> Vec<Hypothesis> {
+) -> Vec<RefinedPeak> {
     let judged = overlay(a, b, JUDGED, parameters.free_space_penalty);
     let looked_at = parameters.max_hypotheses.saturating_add(SPARE);
     let apart = distinct(peaks, OTHERS.max(looked_at) + 1, &judged, parameters);
@@ -217,10 +217,10 @@ fn refined(
     a: &PreparedMap,
     b: &PreparedMap,
     parameters: &MapAlignerParameters,
-) -> Vec<Hypothesis> {
+) -> Vec<RefinedPeak> {
     let refined =
-        peaks.par_iter().filter_map(|(peak, common)| Hypothesis::at(peak, best_score, common, a, b, parameters));
-    let mut hypotheses: Vec<Hypothesis> = Vec::new();
+        peaks.par_iter().filter_map(|(peak, common)| RefinedPeak::at(peak, best_score, common, a, b, parameters));
+    let mut hypotheses: Vec<RefinedPeak> = Vec::new();
     for found in refined.collect::<Vec<_>>() {
         // Poses on the slope of a peak converge to its top.
         let is_same = hypotheses.iter().any(|known| known.is_near(&found.alignment.transform_a_b, parameters));
@@ -234,12 +234,12 @@ fn refined(
 }
 
 /// A hypothesis with its common walls, by which it is distinguished from others.
-struct Hypothesis {
+struct RefinedPeak {
     alignment: MapAlignment,
     common: CommonWalls,
 }
 
-impl Hypothesis {
+impl RefinedPeak {
     /// Refines a peak.
     fn at(
         peak: &ScoredPose,

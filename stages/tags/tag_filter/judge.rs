@@ -61,7 +61,7 @@ pub fn judge(a: RobotTags<'_>, b: RobotTags<'_>, parameters: &TagFilterParameter
         })
     });
     match outcome {
-        Ok((tags, Agreement { consensus, doubt })) => {
+        Ok((tags, TagAgreement { consensus, doubt })) => {
             let provisional = doubt.is_some();
             let doubt = doubt.map(|by_chance| {
                 format!("; but {by_chance}: the directions and the walls of the maps must confirm it")
@@ -104,14 +104,14 @@ fn enough_certain(
 }
 
 /// Tags that agree.
-struct Agreement {
+struct TagAgreement {
     consensus: Consensus,
     /// The probability of chance, if that is why they do not suffice alone.
     doubt: Option<ByChance>,
 }
 
 /// The conditions on the positions of the tags.
-fn agreement(tags: &[CommonTag], parameters: &TagFilterParameters) -> Result<Agreement, TagRefusal> {
+fn agreement(tags: &[CommonTag], parameters: &TagFilterParameters) -> Result<TagAgreement, TagRefusal> {
     let TagFilterParameters { gate, map_stddev, min_tags, rival_distance, best_certainty, .. } = *parameters;
     let pairs: Vec<TagPair> = tags.iter().map(|tag| TagPair::new(tag, map_stddev)).collect();
     let search = find_consensus(&pairs, gate, rival_distance);
@@ -151,7 +151,7 @@ fn agreement(tags: &[CommonTag], parameters: &TagFilterParameters) -> Result<Agr
     if precision < best_certainty {
         return Err(TagRefusal::Imprecise { agreeing, best_certainty, precision });
     }
-    Ok(Agreement { consensus: best, doubt: is_provisional.then_some(ByChance(chance)) })
+    Ok(TagAgreement { consensus: best, doubt: is_provisional.then_some(ByChance(chance)) })
 }
 
 fn ids_of(consensus: &Consensus, tags: &[CommonTag]) -> TagIds {

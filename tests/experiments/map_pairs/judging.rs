@@ -36,10 +36,10 @@ pub(super) fn judge_maps(a: &MapOfBuilding, b: &MapOfBuilding) -> Judged {
     let parameters = RegistrationParameters::default();
     let outcome =
         with_prepared(a, b, &parameters, |pair| match register(pair, &UserKnowledge::default(), &parameters) {
-            Ok(Some(verdict)) => Judged {
-                merged: verdict.refusal.is_none().then(|| verdict.candidate.transform_a_b()),
-                probability: verdict.probability,
-                refusal: verdict.refusal.as_ref().map(|refusal| first_line(&refusal.headline())),
+            Ok(Some(decision)) => Judged {
+                merged: decision.refusal.is_none().then(|| decision.candidate.transform_a_b()),
+                probability: decision.probability,
+                refusal: decision.refusal.as_ref().map(|refusal| first_line(&refusal.headline())),
             },
             Ok(None) => Judged::refused("no place was proposed"),
             Err(refusal) => Judged::refused(&refusal.to_string()),
@@ -56,10 +56,10 @@ pub(crate) fn candidates_of(a: &MapOfBuilding, b: &MapOfBuilding, likely: f64) -
     let found = with_prepared(a, b, &parameters, |pair| {
         let Ok(hypotheses) = pair.hypotheses(&known, search, icp) else { return Default::default() };
         let [a, b] = pair.views();
-        let verdict = judge(&a, &b, &hypotheses, &known, judgement).filter(|verdict| verdict.probability > likely);
-        let aliases = verdict.map(|verdict| {
+        let decision = judge(&a, &b, &hypotheses, &known, judgement).filter(|decision| decision.probability > likely);
+        let aliases = decision.map(|decision| {
             let [similar_a, similar_b] = [&a, &b].map(|view| SelfSimilarity::new(view, judgement));
-            Alias::all(&verdict, (&a, &similar_a), (&b, &similar_b), None, judgement)
+            Alias::all(&decision, (&a, &similar_a), (&b, &similar_b), None, judgement)
         });
         (candidates(&a, &b, &hypotheses, &judgement.comparison()), aliases.unwrap_or_default())
     });

@@ -30,12 +30,12 @@ pub(crate) struct Pair {
     /// Confidence of the truth, if it is given.
     pub(crate) quality: Option<String>,
     pub(crate) maps: [MapOfBuilding; 2],
-    truth: Truth,
+    truth: PairTruth,
 }
 
 /// Which places are the same.
 #[derive(Clone, Debug, Deserialize)]
-struct Truth {
+struct PairTruth {
     /// In map b and in map a: x and y of each, metres.
     common: Vec<[f64; 4]>,
     /// Residuals of the best rigid transform, which the deformation of the maps causes: the median and the 90th
@@ -54,7 +54,7 @@ struct PairOfFiles {
     b: String,
     quality: Option<String>,
     #[serde(flatten)]
-    truth: Truth,
+    truth: PairTruth,
 }
 
 /// The pairs that a folder has a truth of: those of its `pairs.json`, and the last maps of the first two robots of each
@@ -95,9 +95,9 @@ struct TruthOfLog {
 }
 
 impl TruthOfLog {
-    fn of_pair(self) -> Option<Truth> {
+    fn of_pair(self) -> Option<PairTruth> {
         let Self { common, rigid_median, rigid_p90 } = self;
-        Some(Truth { common: common?, rigid_median, rigid_p90 })
+        Some(PairTruth { common: common?, rigid_median, rigid_p90 })
     }
 }
 
@@ -115,7 +115,7 @@ impl Pair {
     /// Whether `T_a_b` aligns the common places within 0.5 m of each other in the median and nine of ten within 1 m,
     /// beyond what the best rigid transform leaves.
     pub(crate) fn is_right(&self, transform_a_b: &Pose2) -> bool {
-        let Truth { rigid_median, rigid_p90, .. } = &self.truth;
+        let PairTruth { rigid_median, rigid_p90, .. } = &self.truth;
         let errors = self.errors(transform_a_b);
         !errors.is_empty() && quantile(&errors, 0.5) < 0.5 + rigid_median && quantile(&errors, 0.9) < 1.0 + rigid_p90
     }

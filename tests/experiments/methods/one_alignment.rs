@@ -110,7 +110,7 @@ impl Aligner {
         let guess = guess?.ok()?;
         let (refined, icp_time) = timed(self.icp.as_ref(), |parameters| {
             let [a, b] = [&maps.a, &maps.b].map(|map| WallMap::new(map, parameters.normal_radius));
-            let guess = icp::FirstGuess::new(guess.transform_a_b, guess.covariance, parameters);
+            let guess = icp::InitialGuess::new(guess.transform_a_b, guess.covariance, parameters);
             let transform_a_b = refine(&a, &b, &guess, parameters).registration.transform_a_b;
             if let Some(parameters) = &self.verifier {
                 let (a, b) = (MapView::rigid(maps.a, &a), MapView::rigid(maps.b, &b));

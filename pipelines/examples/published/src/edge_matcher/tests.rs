@@ -2,10 +2,10 @@
 
 use super::*;
 use crate::pgvd_extractor::{PgvdExtractorParameters, topological_map};
-use gridweave_runtime::ros::{Alignment, Point, TopologicalMap, TopologicalNode, TopologicalPath};
-use gridweave_stages::shared::geometry::{Grid, Point2, Pose2, pose, row_by_row};
+use gridweave_runtime::ros::{Point, TopologicalMap, TopologicalNode, TopologicalPath};
+use gridweave_stages::shared::geometry::{Grid, Point2, Pose2, pose};
 use gridweave_stages::shared::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
-use nalgebra::{Matrix3, UnitComplex, Vector2, Vector3};
+use nalgebra::{UnitComplex, Vector2};
 use proptest::prelude::*;
 
 /// Nodes of a made-up place, and paths between them.

@@ -1,8 +1,7 @@
 //! The filter, maps on one lattice, and the stage from outside.
 
 use super::*;
-use gridweave_stages::shared::geometry::{GridGeometry, pose};
-use gridweave_stages::shared::log_odds::{LogOdds, entropy};
+use gridweave_stages::shared::log_odds::entropy;
 use proptest::prelude::*;
 
 proptest! {

@@ -3,7 +3,7 @@
 use super::rotation::{Rotation, rotations};
 use super::translation::{Shift, project, shifts};
 use super::{HoughSpectrum, HoughSpectrumParameters, WallCells};
-use crate::pair_aligner::{Hypothesis, known_area};
+use crate::pair_aligner::{RatedPose, known_area};
 use gridweave_stages::registration::search::{NamedMap, SearchRefusal};
 use gridweave_stages::shared::geometry::{Pose2, quarter_turn};
 use nalgebra::{Isometry2, Matrix3, UnitComplex, Vector2, Vector3};
@@ -18,7 +18,7 @@ pub fn align_spectra(
     a: &NamedMap<'_>,
     b: &NamedMap<'_>,
     parameters: &HoughSpectrumParameters,
-) -> Result<Vec<Hypothesis>, SearchRefusal> {
+) -> Result<Vec<RatedPose>, SearchRefusal> {
     let walls_a = WallCells::new(a, parameters.max_extent)?;
     let walls_b = WallCells::new(b, parameters.max_extent)?;
     let cell = parameters.cell.max(a.grid.geometry.resolution).max(b.grid.geometry.resolution);
@@ -41,7 +41,7 @@ pub fn align_spectra(
         both.map(|(x, y)| Place { rotation: *rotation, along, x, y }.on(&walls_a, &walls_b)).collect::<Vec<_>>()
     });
     let places: Vec<(Pose2, Matrix3<f64>)> = places.collect();
-    let hypothesis = |(transform, covariance)| Hypothesis::new(&a.grid, &b.grid, transform, covariance, known);
+    let hypothesis = |(transform, covariance)| RatedPose::new(&a.grid, &b.grid, transform, covariance, known);
     Ok(places.into_par_iter().map(hypothesis).collect())
 }
 

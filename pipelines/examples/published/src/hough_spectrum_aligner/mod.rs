@@ -36,7 +36,7 @@ pub use spectrum::HoughSpectrum;
 pub use translation::{Projection, Shift, project, shifts};
 pub use wall_cells::WallCells;
 
-use crate::pair_aligner::{Criterion, Hypothesis, Method, PairAligner};
+use crate::pair_aligner::{Criterion, Method, PairAligner, RatedPose};
 use gridweave_runtime::stage::StageKind;
 use gridweave_stages::registration::search::{NamedMap, SearchRefusal};
 
@@ -58,7 +58,7 @@ pub fn kind() -> StageKind {
 impl Method for HoughSpectrumParameters {
     const NAME: &'static str = "hough_spectrum";
 
-    fn align(&self, a: &NamedMap<'_>, b: &NamedMap<'_>) -> Result<Vec<Hypothesis>, SearchRefusal> {
+    fn align(&self, a: &NamedMap<'_>, b: &NamedMap<'_>) -> Result<Vec<RatedPose>, SearchRefusal> {
         align_spectra(a, b, self)
     }
 

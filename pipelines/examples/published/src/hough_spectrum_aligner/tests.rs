@@ -25,7 +25,7 @@ fn named<'a>(robot: &'a str, map: &'a DrawnMap) -> NamedMap<'a> {
     NamedMap { robot, grid: Grid::new(map.geometry, &map.cells).unwrap() }
 }
 
-fn align(a: &DrawnMap, b: &DrawnMap) -> Vec<Hypothesis> {
+fn align(a: &DrawnMap, b: &DrawnMap) -> Vec<RatedPose> {
     let parameters = HoughSpectrumParameters::default();
     let mut found = align_spectra(&named("a", a), &named("b", b), &parameters).unwrap();
     parameters.criterion().rank(&mut found);

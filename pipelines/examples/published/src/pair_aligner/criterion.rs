@@ -1,6 +1,6 @@
 //! Criterion by which the best hypothesis is accepted.
 
-use super::Hypothesis;
+use super::RatedPose;
 
 /// Requirements on the best hypothesis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,8 +23,8 @@ pub struct Judgement {
 impl Criterion {
     /// Sorts the best first: the greatest omega of those that overlap enough, then the others. Of equals the one with
     /// more cells in common comes first, and of those the first that was found.
-    pub fn rank(&self, hypotheses: &mut [Hypothesis]) {
-        let overlaps = |one: &Hypothesis| one.overlap >= self.min_overlap;
+    pub fn rank(&self, hypotheses: &mut [RatedPose]) {
+        let overlaps = |one: &RatedPose| one.overlap >= self.min_overlap;
         hypotheses.sort_by(|one, other| {
             let omega = other.index.omega().total_cmp(&one.index.omega());
             let cells = other.index.known_in_both().cmp(&one.index.known_in_both());
@@ -33,7 +33,7 @@ impl Criterion {
     }
 
     /// Judges the best of ranked hypotheses.
-    pub fn judge(&self, ranked: &[Hypothesis]) -> Judgement {
+    pub fn judge(&self, ranked: &[RatedPose]) -> Judgement {
         let Some(best) = ranked.first() else { return refused("the maps fit nowhere".to_owned()) };
         let (omega, overlap) = (best.index.omega(), 100.0 * best.overlap);
         let found = format!("omega {omega:.3} at the best pose, where {overlap:.0} % of the smaller map overlap");
@@ -71,9 +71,9 @@ mod tests {
     use gridweave_stages::shared::geometry::Pose2;
     use nalgebra::Matrix3;
 
-    fn hypothesis(agree: u64, disagree: u64, overlap: f64) -> Hypothesis {
+    fn hypothesis(agree: u64, disagree: u64, overlap: f64) -> RatedPose {
         let index = AcceptanceIndex { agree, disagree };
-        Hypothesis { transform_a_b: Pose2::identity(), covariance: Matrix3::identity(), index, overlap }
+        RatedPose { transform_a_b: Pose2::identity(), covariance: Matrix3::identity(), index, overlap }
     }
 
     const CRITERION: Criterion = Criterion { min_omega: 0.9, min_overlap: 0.1 };

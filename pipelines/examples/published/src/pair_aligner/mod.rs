@@ -5,14 +5,14 @@
 //! accept the best if its omega is high enough. There is no other check against a wrong merge: maps of different
 //! buildings, and self-similar buildings, may have a high omega at a wrong pose. `merge_verifier` uses more evidence.
 //!
-//! - [`Hypothesis`]: a relative pose with its index.
+//! - [`RatedPose`]: a relative pose with its index.
 //! - [`Criterion`]: ranks hypotheses, and decides whether the best is accepted.
 //! - [`PairAligner`]: the stage of a [`Method`].
 
 mod criterion;
-mod hypothesis;
+mod rated_pose;
 mod stage;
 
 pub use criterion::{Criterion, Judgement};
-pub use hypothesis::{Hypothesis, known_area};
+pub use rated_pose::{RatedPose, known_area};
 pub use stage::{Method, PairAligner};

@@ -1,6 +1,6 @@
 //! The stage of a method: maps in, hypotheses for every pair of robots out.
 
-use super::{Criterion, Hypothesis};
+use super::{Criterion, RatedPose};
 use gridweave_runtime::ros::{Alignment, Header, OccupancyGrid};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 use gridweave_stages::registration::search::{NamedMap, SearchRefusal};
@@ -16,7 +16,7 @@ pub trait Method {
     ///
     /// # Errors
     /// Maps on which the method cannot work.
-    fn align(&self, a: &NamedMap<'_>, b: &NamedMap<'_>) -> Result<Vec<Hypothesis>, SearchRefusal>;
+    fn align(&self, a: &NamedMap<'_>, b: &NamedMap<'_>) -> Result<Vec<RatedPose>, SearchRefusal>;
 
     /// Criterion by which the best of them is accepted.
     fn criterion(&self) -> Criterion;
@@ -100,7 +100,7 @@ impl<M: Method> PairAligner<M> {
         Ok(())
     }
 
-    fn send(&self, of_pair: Alignment, mut found: Vec<Hypothesis>, output: &Output<Found>) -> Result<(), StageError> {
+    fn send(&self, of_pair: Alignment, mut found: Vec<RatedPose>, output: &Output<Found>) -> Result<(), StageError> {
         let criterion = self.method.criterion();
         criterion.rank(&mut found);
         found.truncate(self.method.max_hypotheses());
@@ -124,7 +124,7 @@ impl<M: Method> PairAligner<M> {
     }
 }
 
-fn at(found: &Hypothesis, of_pair: &Alignment) -> Alignment {
+fn at(found: &RatedPose, of_pair: &Alignment) -> Alignment {
     let mut alignment =
         Alignment { covariance: row_by_row(&found.covariance), score: found.index.omega(), ..of_pair.clone() };
     alignment.set_transform_a_b(&found.transform_a_b);

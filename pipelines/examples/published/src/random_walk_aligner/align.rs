@@ -2,7 +2,7 @@
 
 use super::walk::{WalkEnd, walk};
 use super::{ClassifiedMap, RandomWalkParameters, dissimilarity};
-use crate::pair_aligner::{Hypothesis, known_area};
+use crate::pair_aligner::{RatedPose, known_area};
 use gridweave_stages::registration::search::{Content, NamedMap, PreparedMap, Raster, SearchRefusal};
 use gridweave_stages::shared::geometry::{Pose2, quarter_turn};
 use nalgebra::{Isometry2, Matrix3, UnitComplex, Vector3};
@@ -21,7 +21,7 @@ pub fn align_by_walks(
     b: &NamedMap<'_>,
     parameters: &RandomWalkParameters,
     seed: u64,
-) -> Result<Vec<Hypothesis>, SearchRefusal> {
+) -> Result<Vec<RatedPose>, SearchRefusal> {
     let cell = parameters.cell.max(PreparedMap::least_cell(&a.grid)).max(PreparedMap::least_cell(&b.grid));
     let (map_a, map_b) = (classified(a, cell, parameters)?, classified(b, cell, parameters)?);
     let walks = Walks { a: &map_a, b: &map_b, parameters, seed };
@@ -30,12 +30,12 @@ pub fn align_by_walks(
     ends.sort_by(|one, other| one.value.total_cmp(&other.value));
 
     let known = known_area(&a.grid).min(known_area(&b.grid));
-    let mut found: Vec<Hypothesis> = Vec::new();
+    let mut found: Vec<RatedPose> = Vec::new();
     for end in &ends {
         let (transform, covariance) = walks.transform(end);
-        let hypothesis = Hypothesis::new(&a.grid, &b.grid, transform, covariance, known);
+        let hypothesis = RatedPose::new(&a.grid, &b.grid, transform, covariance, known);
         let is_known =
-            |other: &Hypothesis| hypothesis.is_near(other, &map_b.middle(), parameters.apart, parameters.apart_yaw);
+            |other: &RatedPose| hypothesis.is_near(other, &map_b.middle(), parameters.apart, parameters.apart_yaw);
         if !found.iter().any(is_known) {
             found.push(hypothesis);
         }

@@ -33,7 +33,7 @@ pub use distance_map::DistanceMap;
 pub use parameters::RandomWalkParameters;
 pub use walk::{WalkEnd, walk};
 
-use crate::pair_aligner::{Criterion, Hypothesis, Method, PairAligner};
+use crate::pair_aligner::{Criterion, Method, PairAligner, RatedPose};
 use gridweave_runtime::stage::StageKind;
 use gridweave_stages::registration::search::{NamedMap, SearchRefusal};
 
@@ -62,7 +62,7 @@ struct RandomWalk {
 impl Method for RandomWalk {
     const NAME: &'static str = "random_walk";
 
-    fn align(&self, a: &NamedMap<'_>, b: &NamedMap<'_>) -> Result<Vec<Hypothesis>, SearchRefusal> {
+    fn align(&self, a: &NamedMap<'_>, b: &NamedMap<'_>) -> Result<Vec<RatedPose>, SearchRefusal> {
         align_by_walks(a, b, &self.parameters, self.seed)
     }
 

@@ -1,4 +1,4 @@
-//! The verdict on all hypotheses for a pair of maps, and its reason as text.
+//! The decision on all hypotheses for a pair of maps, and its reason as text.
 
 use super::weights::{INTERCEPT, TYPICAL, WEIGHTS};
 use super::{Alias, Candidate, JudgementParameters, Listed, Refusal, Term};
@@ -42,9 +42,9 @@ impl SecondBest {
     }
 }
 
-/// The verdict on all hypotheses for a pair.
+/// The decision on all hypotheses for a pair.
 #[derive(Clone, Debug)]
-pub struct Verdict {
+pub struct Decision {
     /// The candidate that is accepted, or that is most probable.
     pub candidate: Candidate,
     /// Why it is refused; none if it is accepted.
@@ -61,8 +61,8 @@ pub struct Verdict {
     pub listed: Listed,
 }
 
-impl Verdict {
-    /// Verdict on a candidate that was not judged.
+impl Decision {
+    /// Decision on a candidate that was not judged.
     pub(super) fn of(candidate: Candidate) -> Self {
         Self {
             candidate,
@@ -80,7 +80,7 @@ impl Verdict {
         self.refusal.is_none() && self.chosen.is_none() && !self.candidate.rests_on(Basis::is_by_tags)
     }
 
-    /// The same verdict with an alias as a further hypothesis, if there is one.
+    /// The same decision with an alias as a further hypothesis, if there is one.
     pub fn against(self, alias: Option<&Alias>, parameters: &JudgementParameters) -> Self {
         let Some(alias) = alias else { return self };
         // The odds of all others against the candidate, and those of the alias.
@@ -119,7 +119,7 @@ impl Verdict {
         self.candidate.others.iter().find(|other| other.source != *source)
     }
 
-    /// Reason of the verdict: a short paragraph, and after an empty line all details. `accept` is the required
+    /// Reason of the decision: a short paragraph, and after an empty line all details. `accept` is the required
     /// probability, and `stage` the name of the stage that has this parameter.
     pub fn reason(&self, accept: f64, stage: &str, robot_a: &str, robot_b: &str) -> String {
         let mut text = String::new();

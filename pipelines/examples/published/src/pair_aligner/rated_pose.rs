@@ -13,7 +13,7 @@ pub fn known_area(grid: &Grid<'_>) -> f64 {
 
 /// A hypothesis of the relative pose of two maps.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hypothesis {
+pub struct RatedPose {
     /// `T_a_b`.
     pub transform_a_b: Pose2,
     /// Covariance of (x, y, yaw) of `T_a_b`, metres and radians.
@@ -24,7 +24,7 @@ pub struct Hypothesis {
     pub overlap: f64,
 }
 
-impl Hypothesis {
+impl RatedPose {
     /// Counts the cells of two maps at a relative pose. `known` is the [`known_area`] of the map that knows less.
     pub fn new(a: &Grid<'_>, b: &Grid<'_>, transform_a_b: Pose2, covariance: Matrix3<f64>, known: f64) -> Self {
         let index = AcceptanceIndex::new(a, b, &transform_a_b);

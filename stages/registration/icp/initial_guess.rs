@@ -6,14 +6,14 @@ use nalgebra::{Matrix3, Vector3};
 
 /// An initial guess of `T_a_b` with the covariance of its x, y and yaw.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FirstGuess {
+pub struct InitialGuess {
     /// Pose of map b in map a.
     pub transform_a_b: Pose2,
     /// Covariance of (x, y, yaw), metres and radians.
     pub covariance: Matrix3<f64>,
 }
 
-impl FirstGuess {
+impl InitialGuess {
     /// Makes an initial guess. A covariance that is not finite or not positive definite is replaced by the default of
     /// the parameters.
     pub fn new(transform_a_b: Pose2, covariance: Matrix3<f64>, parameters: &IcpParameters) -> Self {
@@ -63,7 +63,7 @@ impl LocalFrame {
     }
 }
 
-impl FirstGuess {
+impl InitialGuess {
     /// Covariance of the initial guess in local coordinates, with the slack of the parameters added.
     pub(super) fn local_covariance(&self, frame: &LocalFrame, parameters: &IcpParameters) -> Matrix3<f64> {
         let derivative = frame.inverse_jacobian(&self.transform_a_b);
@@ -120,7 +120,7 @@ mod tests {
             x in -50.0..50.0, y in -50.0..50.0, yaw in -3.0..3.0, change in prop::array::uniform3(-0.5..0.5),
         ) {
             let frame = LocalFrame { centre: Point2::new(7.0, -30.0), scale: 4.0 };
-            let guess = FirstGuess { transform_a_b: pose(x, y, yaw), covariance: Matrix3::identity() };
+            let guess = InitialGuess { transform_a_b: pose(x, y, yaw), covariance: Matrix3::identity() };
             let change = Vector3::from(change);
             let moved = frame.moved(&guess.transform_a_b, &change);
             prop_assert!((guess.local_deviation(&moved, &frame) - change).norm() < 1e-9);
@@ -131,10 +131,10 @@ mod tests {
     fn an_invalid_covariance_is_replaced() {
         let parameters = IcpParameters::default();
         let usable = Matrix3::identity() * 0.01;
-        let kept = FirstGuess::new(pose(0.0, 0.0, 0.0), usable, &parameters);
+        let kept = InitialGuess::new(pose(0.0, 0.0, 0.0), usable, &parameters);
         assert_eq!(kept.covariance, usable);
         for covariance in [Matrix3::zeros(), -usable, usable * f64::NAN, usable * f64::INFINITY] {
-            let guess = FirstGuess::new(pose(0.0, 0.0, 0.0), covariance, &parameters);
+            let guess = InitialGuess::new(pose(0.0, 0.0, 0.0), covariance, &parameters);
             assert_eq!(guess.covariance.m11, parameters.initial_position_deviation.powi(2));
             assert_eq!(guess.covariance.m33, parameters.initial_yaw_deviation.powi(2));
         }
