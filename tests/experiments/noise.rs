@@ -60,75 +60,62 @@ struct Sweep {
     title: &'static str,
     axis: &'static str,
     values: &'static [f64],
-    /// Parameters of the simulator for a value.
-    world: fn(f64) -> Vec<String>,
-    /// Parameters of the pipeline's stages for a value.
-    merge: fn(f64) -> Vec<String>,
+    /// The parameter of the simulator that takes the values.
+    parameter: &'static str,
+    /// Parameters of the pipeline's stages.
+    merge: &'static [&'static str],
 }
 
 const NOISES: &[f64] = &[0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.75, 1.0];
 
 impl Property {
     fn sweep(self) -> Sweep {
-        let nothing: fn(f64) -> Vec<String> = |_| Vec::new();
-        match self {
-            Self::TagNoise => Sweep {
-                name: "tag_noise",
-                title: "Noise of the tags' ranges",
-                axis: "standard deviation of a range, m",
-                values: NOISES,
-                world: |value| vec![format!("tag_noise={value}")],
-                merge: nothing,
-            },
-            Self::TagNoiseFixedWindow => Sweep {
-                name: "tag_noise_fixed_window",
-                title: "Noise of the tags' ranges, read-out window of 6 cm",
-                axis: "standard deviation of a range, m",
-                values: NOISES,
-                world: |value| vec![format!("tag_noise={value}")],
-                merge: |_| vec!["tags.window_deviations=0".to_owned()],
-            },
-            Self::LostReadings => Sweep {
-                name: "lost_readings",
-                title: "Lost readings of tags",
-                axis: "share of the readings that are lost",
-                values: &[0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95],
-                world: |value| vec![format!("lost_readings={value}")],
-                merge: nothing,
-            },
-            Self::Reflections => Sweep {
-                name: "reflections",
-                title: "Readings over a reflection, 0.3 m to 2 m too long",
-                axis: "share of the readings that are reflected",
-                values: &[0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5],
-                world: |value| vec![format!("reflections={value}")],
-                merge: nothing,
-            },
-            Self::Drift => Sweep {
-                name: "drift",
-                title: "Drift of the poses, loop closures every 10 m",
-                axis: "standard deviation after one metre, rad and m",
-                values: &[0.0, 0.001, 0.002, 0.004, 0.007, 0.01, 0.015, 0.02],
-                world: |value| vec![format!("drift={value}")],
-                merge: nothing,
-            },
-            Self::Overlap => Sweep {
-                name: "overlap",
-                title: "Overlap of the maps",
-                axis: "share of a robot's rooms that the other has as well",
-                values: &[0.1, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0],
-                world: |value| vec![format!("overlap={value}")],
-                merge: nothing,
-            },
-            Self::Tags => Sweep {
-                name: "tags",
-                title: "Tags in the building (20 m x 15 m)",
-                axis: "number of tags",
-                values: &[4.0, 6.0, 9.0, 12.0, 18.0, 24.0, 36.0],
-                world: |value| vec![format!("tags={value}")],
-                merge: nothing,
-            },
-        }
+        let (parameter, title, axis, values): (_, _, _, &[f64]) = match self {
+            Self::TagNoise => ("tag_noise", "Noise of the tags' ranges", "standard deviation of a range, m", NOISES),
+            Self::TagNoiseFixedWindow => {
+                let title = "Noise of the tags' ranges, read-out window of 6 cm";
+                let merge = &["tags.window_deviations=0"];
+                return Sweep { name: "tag_noise_fixed_window", title, merge, ..Self::TagNoise.sweep() };
+            }
+            Self::LostReadings => (
+                "lost_readings",
+                "Lost readings of tags",
+                "share of the readings that are lost",
+                &[0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95],
+            ),
+            Self::Reflections => (
+                "reflections",
+                "Readings over a reflection, 0.3 m to 2 m too long",
+                "share of the readings that are reflected",
+                &[0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5],
+            ),
+            Self::Drift => (
+                "drift",
+                "Drift of the poses, loop closures every 10 m",
+                "standard deviation after one metre, rad and m",
+                &[0.0, 0.001, 0.002, 0.004, 0.007, 0.01, 0.015, 0.02],
+            ),
+            Self::Overlap => (
+                "overlap",
+                "Overlap of the maps",
+                "share of a robot's rooms that the other has as well",
+                &[0.1, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0],
+            ),
+            Self::Tags => (
+                "tags",
+                "Tags in the building (20 m x 15 m)",
+                "number of tags",
+                &[4.0, 6.0, 9.0, 12.0, 18.0, 24.0, 36.0],
+            ),
+        };
+        Sweep { name: parameter, title, axis, values, parameter, merge: &[] }
+    }
+}
+
+impl Sweep {
+    /// The settings of the simulator for a value.
+    fn world(&self, value: f64) -> String {
+        format!("{}={value}", self.parameter)
     }
 }
 
@@ -284,9 +271,8 @@ fn is_wrong_by_places(common: &CommonPlaces) -> bool {
 }
 
 fn trials(sweep: &Sweep, value: f64, args: &NoiseArgs, registry: &Registry) -> Result<Vec<Trial>> {
-    let mut world_settings = vec!["robots=2".to_owned()];
-    world_settings.extend((sweep.world)(value));
-    let merge_settings = (sweep.merge)(value);
+    let world_settings = ["robots=2".to_owned(), sweep.world(value)];
+    let merge_settings: Vec<String> = sweep.merge.iter().map(|setting| (*setting).to_owned()).collect();
     let seeds: Vec<u64> = (args.first_seed..args.first_seed.saturating_add(args.seeds)).collect();
     let one = |&seed: &u64| {
         let world = World::simulate(&world_settings, seed, registry)?;
@@ -314,22 +300,19 @@ mod tests {
     #[test]
     fn every_sweep_sets_parameters_that_there_are() {
         let registry = gridweave::shipped::registry([]);
-        for property in Property::value_variants() {
-            let sweep = property.sweep();
-            for &value in sweep.values {
-                for (pipeline, prefix, settings) in
-                    [("simulate", "simulator.", (sweep.world)(value)), ("tag_merge", "", (sweep.merge)(value))]
-                {
-                    let mut overrides = Overrides::default();
-                    overrides.set_for_kind("mcap_sink", "file", "out.mcap");
-                    if pipeline != "simulate" {
-                        overrides.set_for_kind("mcap_source", "files", vec!["in.mcap".to_owned()]);
-                    }
-                    settings.iter().for_each(|setting| overrides.set(&format!("{prefix}{setting}")).unwrap());
-                    let loaded = gridweave::shipped::load(pipeline.as_ref(), &overrides, &registry);
-                    assert!(loaded.is_ok(), "{} {value}", sweep.name);
-                }
+        let load = |pipeline: &str, settings: &[String]| {
+            let mut overrides = Overrides::default();
+            overrides.set_for_kind("mcap_sink", "file", "out.mcap");
+            if pipeline != "simulate" {
+                overrides.set_for_kind("mcap_source", "files", vec!["in.mcap".to_owned()]);
             }
+            settings.iter().for_each(|setting| overrides.set(setting).unwrap());
+            assert!(gridweave::shipped::load(pipeline.as_ref(), &overrides, &registry).is_ok(), "{settings:?}");
+        };
+        for sweep in Property::value_variants().iter().map(|property| property.sweep()) {
+            let worlds = sweep.values.iter().map(|value| format!("simulator.{}", sweep.world(*value)));
+            worlds.for_each(|world| load("simulate", &[world]));
+            load("tag_merge", &sweep.merge.iter().map(|setting| (*setting).to_owned()).collect::<Vec<_>>());
         }
     }
 }

@@ -98,7 +98,7 @@ impl MergePlan {
         let number = self.add_alone(robot);
         let mut reports = self.refusals(robot);
         if let Some(number) = number {
-            self.tie_with_others(number, GROUPS_TRIED, &mut reports);
+            self.unite_with_others(number, GROUPS_TRIED, &mut reports);
         }
         reports.extend(self.retractions(robot, &reports));
         self.changed(reports)
@@ -116,7 +116,7 @@ impl MergePlan {
         }
         for robot in &robots {
             if let Some(number) = self.groups.of(robot).map(|group| group.number) {
-                self.tie_with_others(number, usize::MAX, &mut reports);
+                self.unite_with_others(number, usize::MAX, &mut reports);
             }
         }
         for robot in &robots {
@@ -125,7 +125,7 @@ impl MergePlan {
         loop {
             let count = self.groups.len();
             for number in self.groups.by_size() {
-                self.tie_with_others(number, usize::MAX, &mut reports);
+                self.unite_with_others(number, usize::MAX, &mut reports);
             }
             if self.groups.len() == count {
                 break;
@@ -135,19 +135,19 @@ impl MergePlan {
     }
 
     /// Searches a group on others, the largest first.
-    fn tie_with_others(&mut self, number: u64, most: usize, reports: &mut Vec<PairReport>) {
+    fn unite_with_others(&mut self, number: u64, most: usize, reports: &mut Vec<PairReport>) {
         let mut mine = number;
         let others: Vec<u64> = self.groups.by_size().into_iter().filter(|other| *other != number).take(most).collect();
         for other in others {
             let pair = (mine.min(other), mine.max(other));
             if self.tried.insert(pair) {
-                mine = self.tie(mine, other, reports).unwrap_or(mine);
+                mine = self.unite(mine, other, reports).unwrap_or(mine);
             }
         }
     }
 
     /// Searches one group on another. Returns the number of the united group, if the relative pose is clear.
-    fn tie(&mut self, one: u64, other: u64, reports: &mut Vec<PairReport>) -> Option<u64> {
+    fn unite(&mut self, one: u64, other: u64, reports: &mut Vec<PairReport>) -> Option<u64> {
         let (one, other) = (self.groups.get(one)?, self.groups.get(other)?);
         // The larger one is map a; of two robots the first by name.
         let (group_a, group_b) = if one.rank() < other.rank() { (one, other) } else { (other, one) };
@@ -167,35 +167,45 @@ impl MergePlan {
         let is_clear = found.second_best_share <= self.parameters.tie_second_best && self.agrees_in_much(&found);
         let on_merged = found.hypotheses.first()?;
         let best = on_merged.transform_a_b;
+        let mut fits = is_clear;
         if count_a + count_b == 2 {
             reports.push(PairReport::of(pair, Ok(with_reasons(&found))));
-            return is_clear.then(|| self.groups.unite(first, second, &best)).flatten();
+        } else {
+            let pairs = self.pairs_in_common(group_a, group_b, &best);
+            let of_pairs = match is_clear {
+                true => self.predicted_pairs(&pairs, count_a.max(count_b), on_merged),
+                false => self.undecided(pairs.first()?, count_a + count_b, &found).into_iter().collect(),
+            };
+            fits &= !of_pairs.is_empty();
+            reports.extend(of_pairs);
         }
-        let pairs = self.pairs_in_common(group_a, group_b, &best);
-        if is_clear {
-            let reported = pairs.iter().filter_map(|pair| self.predicted(pair, count_a.max(count_b), on_merged));
-            let reported = reported.map(|reported| PairReport { is_supported: true, ..reported });
-            let reported: Vec<PairReport> = reported.take(1 + self.parameters.predictions).collect();
-            self.predictions += reported.len() as u64;
-            let fits = !reported.is_empty();
-            reports.extend(reported);
-            return fits.then(|| self.groups.unite(first, second, &best)).flatten();
+        fits.then(|| self.groups.unite(first, second, &best)).flatten()
+    }
+
+    /// Hypotheses of the pairs with the most wall in common, where the relative pose of their groups is clear.
+    fn predicted_pairs(&mut self, pairs: &[PairInCommon], others: usize, on_merged: &MapAlignment) -> Vec<PairReport> {
+        let reported = pairs.iter().filter_map(|pair| self.predicted(pair, others, on_merged));
+        let reported = reported.map(|reported| PairReport { is_supported: true, ..reported });
+        let reported: Vec<PairReport> = reported.take(1 + self.parameters.predictions).collect();
+        self.predictions += reported.len() as u64;
+        reported
+    }
+
+    /// The report on the pair with the most wall in common, where the relative pose of their groups is not clear: a
+    /// refusal if the building is self-similar, and otherwise the hypotheses of the two robots alone.
+    fn undecided(&mut self, pair: &PairInCommon, robots: usize, found: &MapAlignments) -> Option<PairReport> {
+        if !self.has_alike(found) {
+            return self.searched(pair);
         }
-        if self.has_alike(&found) {
-            let (shift, turn) = found.second_best_change;
-            let reason = format!(
-                "on the merged map of {} robots a second pose fits {:.0} % as well, {shift:.1} m and {:.0} degrees away: the maps do not decide \
-                 which is right",
-                count_a + count_b - 1,
-                100.0 * found.second_best_share,
-                turn.to_degrees(),
-            );
-            reports.extend(pairs.first().map(|PairInCommon { pair, .. }| PairReport::of(pair.clone(), Err(reason))));
-            return None;
-        }
-        // The merged maps are ambiguous. The two robots with the most wall in common are searched alone.
-        reports.extend(self.searched(pairs.first()?));
-        None
+        let (shift, turn) = found.second_best_change;
+        let reason = format!(
+            "on the merged map of {} robots a second pose fits {:.0} % as well, {shift:.1} m and {:.0} degrees away: the maps do not decide \
+             which is right",
+            robots - 1,
+            100.0 * found.second_best_share,
+            turn.to_degrees(),
+        );
+        Some(PairReport::of(pair.pair.clone(), Err(reason)))
     }
 
     /// Window of the relative poses of two groups, by the first robot of each with a known initial pose.

@@ -21,17 +21,13 @@ pub struct Bearing {
     pub stddev: f64,
 }
 
-/// The bearings of one tag, averaged by position.
-///
-/// As with [`ReadingGroups`](super::ReadingGroups), the common errors of the readings at one position do not average
-/// out: those of the pose and of the heading. A bearing that contradicts the others at its position makes a separate
-/// group, so that an outlier does not spoil a mean.
-#[derive(Clone, Debug, Default)]
-pub struct BearingGroups(PositionGroups<BearingSums>);
+/// The bearings of one tag, averaged by position: the common error of the heading does not average out, as that of the
+/// pose does not.
+pub type BearingGroups = PositionGroups<BearingSums>;
 
 /// Weighted sums over bearings.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct BearingSums {
+pub struct BearingSums {
     /// The first bearing, radians: the others are relative to it, so that they do not wrap.
     first: f64,
     turn: f64,
@@ -64,17 +60,6 @@ impl Measurement for Bearing {
 }
 
 impl BearingGroups {
-    /// Adds a bearing. The robot is at a new position when it is `min_travel` metres or more away from the start of
-    /// the last one.
-    pub fn add(&mut self, bearing: &Bearing, min_travel: f64) {
-        self.0.add(bearing, min_travel);
-    }
-
-    /// Number of bearings.
-    pub fn bearings(&self) -> u32 {
-        self.0.measurements()
-    }
-
     /// One ray for each group: variance of the mean direction including that of the heading, and the variance of the
     /// position.
     ///
@@ -82,7 +67,7 @@ impl BearingGroups {
     /// heading. The pose counts with its largest variance in any direction, as in
     /// [`ReadingGroups::rings`](super::ReadingGroups::rings).
     pub fn rays(&self, pose_stddev: f64, heading_stddev: f64) -> impl Iterator<Item = Ray> + '_ {
-        self.0.iter().map(move |group| Ray {
+        self.iter().map(move |group| Ray {
             origin: group.place(),
             bearing: group.bearing(),
             variance: group.variance(heading_stddev),
@@ -93,7 +78,7 @@ impl BearingGroups {
     /// Common error of the poses, which moves the tag; see
     /// [`ReadingGroups::shared_covariance`](super::ReadingGroups::shared_covariance).
     pub fn shared_covariance(&self, heading_stddev: f64) -> Matrix2<f64> {
-        self.0.shared_covariance(|group| group.variance(heading_stddev))
+        self.mean_pose_covariance(|group| group.variance(heading_stddev))
     }
 }
 
@@ -123,7 +108,7 @@ mod tests {
     fn rays(bearings: &[Bearing], pose_stddev: f64, heading_stddev: f64) -> Vec<Ray> {
         let mut groups = BearingGroups::default();
         bearings.iter().for_each(|bearing| groups.add(bearing, 0.1));
-        assert_eq!(groups.bearings() as usize, bearings.len());
+        assert_eq!(groups.measurements() as usize, bearings.len());
         groups.rays(pose_stddev, heading_stddev).collect()
     }
 
@@ -142,20 +127,5 @@ mod tests {
         let position = Position { yaw_variance: 0.04, ..Position::new(Point2::origin()) };
         let found = rays(&[Bearing { position, ..bearing(0.0, 1.0) }], 0.0, 0.01);
         assert!((found[0].variance - (0.05f64.powi(2) + 0.04)).abs() < 1e-12, "{found:?}");
-    }
-
-    #[test]
-    fn a_position_ends_when_the_robot_has_moved_on() {
-        let drive: Vec<_> = (0..10).map(|step| bearing(0.06 * f64::from(step), 1.0)).collect();
-        assert_eq!(rays(&drive, 0.0, 0.0).len(), 5);
-    }
-
-    #[test]
-    fn an_outlier_does_not_spoil_the_mean_of_its_position() {
-        for order in [[1.0, 1.02, -2.0, 0.98], [-2.0, 1.0, 1.02, 0.98]] {
-            let found = rays(&order.map(|angle| bearing(0.0, angle)), 0.0, 0.0);
-            assert_eq!(found.len(), 2, "{found:?}");
-            assert!(found.iter().any(|ray| (ray.bearing - 1.0).abs() < 1e-9), "{found:?}");
-        }
     }
 }

@@ -251,7 +251,9 @@ impl TagLocalizer {
             mode: None,
         });
         let TagLocalizerParameters { min_travel, reach, .. } = self.parameters;
-        if !matches!(measured, Measured::Bearing { .. }) && tag.readings() == tag.bearings.bearings() && tag.beyond == 0
+        if !matches!(measured, Measured::Bearing { .. })
+            && tag.readings() == tag.bearings.measurements()
+            && tag.beyond == 0
         {
             tag.first_place = first_place;
         }

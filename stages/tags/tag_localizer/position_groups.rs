@@ -5,7 +5,7 @@ use crate::shared::geometry::Point2;
 use nalgebra::{Matrix2, Vector2};
 
 /// A measurement of a tag.
-pub(super) trait Measurement {
+pub trait Measurement {
     /// Weighted sums of what is measured, relative to the first measurement: then they lose no digits far from the
     /// origin, and angles do not wrap.
     type Sums;
@@ -32,7 +32,7 @@ pub(super) trait Measurement {
 /// So a robot that waits does not make a tag certain. A measurement that contradicts the others at its position makes
 /// a separate group, so that an outlier does not spoil a mean.
 #[derive(Clone, Debug, Default)]
-pub(super) struct PositionGroups<S> {
+pub struct PositionGroups<S> {
     groups: Vec<Group<S>>,
     /// Index of the first group at the robot's present position.
     here: usize,
@@ -41,7 +41,7 @@ pub(super) struct PositionGroups<S> {
 
 /// Weighted sums over the measurements of one group.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Group<S> {
+pub struct Group<S> {
     /// Where the robot was at the first measurement at this position.
     pub(super) anchor: Point2,
     /// Sum of the weights: those are inverse variances of what is measured.
@@ -56,7 +56,7 @@ pub(super) struct Group<S> {
 impl<S> PositionGroups<S> {
     /// Adds a measurement. The robot is at a new position when it is `min_travel` metres or more away from the start
     /// of the last one.
-    pub(super) fn add<M: Measurement<Sums = S>>(&mut self, measurement: &M, min_travel: f64) {
+    pub fn add<M: Measurement<Sums = S>>(&mut self, measurement: &M, min_travel: f64) {
         self.measurements = self.measurements.saturating_add(1);
         let Position { place, covariance, .. } = *measurement.position();
         let last = self.groups.get(self.here).map(|group| group.anchor);
@@ -87,7 +87,7 @@ impl<S> PositionGroups<S> {
     }
 
     /// Number of measurements.
-    pub(super) fn measurements(&self) -> u32 {
+    pub fn measurements(&self) -> u32 {
         self.measurements
     }
 
@@ -100,7 +100,7 @@ impl<S> PositionGroups<S> {
     ///
     /// The correlation of the errors of the poses is unknown. If it is full, the error of the tag is theirs; in any
     /// case a mean of errors varies by no more than the mean of their variances.
-    pub(super) fn shared_covariance(&self, variance: impl Fn(&Group<S>) -> f64) -> Matrix2<f64> {
+    pub(super) fn mean_pose_covariance(&self, variance: impl Fn(&Group<S>) -> f64) -> Matrix2<f64> {
         let mut sum = Matrix2::zeros();
         let mut weights = 0.0;
         for group in &self.groups {

@@ -18,13 +18,8 @@ pub struct Reading {
     pub stddev: f64,
 }
 
-/// The readings of one tag, averaged by position.
-///
-/// The noise of readings averages out, the error of the pose does not, as readings at one position share it. So a
-/// robot that waits does not make a tag certain. A reading that contradicts the others at its position makes a
-/// separate group, so that an outlier does not spoil a mean.
-#[derive(Clone, Debug, Default)]
-pub struct ReadingGroups(PositionGroups<f64>);
+/// The readings of one tag, averaged by position; `f64` is their sum.
+pub type ReadingGroups = PositionGroups<f64>;
 
 impl Measurement for Reading {
     /// Of the ranges.
@@ -52,21 +47,10 @@ impl Measurement for Reading {
 }
 
 impl ReadingGroups {
-    /// Adds a reading. The robot is at a new position when it is `min_travel` metres or more away from the start of
-    /// the last one.
-    pub fn add(&mut self, reading: &Reading, min_travel: f64) {
-        self.0.add(reading, min_travel);
-    }
-
-    /// Number of readings.
-    pub fn readings(&self) -> u32 {
-        self.0.measurements()
-    }
-
     /// One ring for each group: variance of the mean range, and that of the pose, at most in any direction.
     /// `pose_stddev`, metres, is a lower bound of its deviation.
     pub fn rings(&self, pose_stddev: f64) -> impl Iterator<Item = Ring> + '_ {
-        self.0.iter().map(move |group| Ring {
+        self.iter().map(move |group| Ring {
             centre: group.place(),
             radius: group.range(),
             variance: group.variance(pose_stddev),
@@ -76,7 +60,7 @@ impl ReadingGroups {
     /// Common error of the poses, which moves the tag and does not average out over positions: their mean covariance,
     /// weighted by the information of each ring, square metres. Zeros if it is unknown.
     pub fn shared_covariance(&self, pose_stddev: f64) -> Matrix2<f64> {
-        self.0.shared_covariance(|group| group.variance(pose_stddev))
+        self.mean_pose_covariance(|group| group.variance(pose_stddev))
     }
 }
 

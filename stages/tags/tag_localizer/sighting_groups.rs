@@ -16,16 +16,13 @@ pub struct Sighting {
     pub stddev: f64,
 }
 
-/// The sightings of one tag, averaged by position.
-///
-/// As with [`ReadingGroups`](super::ReadingGroups), the common errors of the sightings at one position do not average
-/// out: that of the pose and, in proportion to the distance of the tag, that of the heading.
-#[derive(Clone, Debug, Default)]
-pub struct SightingGroups(PositionGroups<SightingSums>);
+/// The sightings of one tag, averaged by position: the common error of the heading does not average out, in proportion
+/// to the distance of the tag.
+pub type SightingGroups = PositionGroups<SightingSums>;
 
 /// Weighted sums over sightings.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct SightingSums {
+pub struct SightingSums {
     /// Position of the tag at the first sighting.
     first: Point2,
     /// Of the positions relative to that.
@@ -58,23 +55,12 @@ impl Measurement for Sighting {
 }
 
 impl SightingGroups {
-    /// Adds a sighting. The robot is at a new position when it is `min_travel` metres or more away from the start of
-    /// the last one.
-    pub fn add(&mut self, sighting: &Sighting, min_travel: f64) {
-        self.0.add(sighting, min_travel);
-    }
-
-    /// Number of sightings.
-    pub fn sightings(&self) -> u32 {
-        self.0.measurements()
-    }
-
     /// One ring of radius 0 for each group: the likelihood of a position falls with its distance from the sighting.
     ///
     /// `pose_stddev`, metres, is a lower bound of the deviation of the pose; `heading_stddev`, radians, that of its
     /// heading.
     pub fn rings(&self, pose_stddev: f64, heading_stddev: f64) -> impl Iterator<Item = Ring> + '_ {
-        self.0.iter().map(move |group| Ring {
+        self.iter().map(move |group| Ring {
             centre: group.seen(),
             radius: 0.0,
             variance: group.variance(pose_stddev, heading_stddev),
@@ -84,7 +70,7 @@ impl SightingGroups {
     /// Common error of the poses, which moves the tag; see
     /// [`ReadingGroups::shared_covariance`](super::ReadingGroups::shared_covariance).
     pub fn shared_covariance(&self, pose_stddev: f64, heading_stddev: f64) -> Matrix2<f64> {
-        self.0.shared_covariance(|group| group.variance(pose_stddev, heading_stddev))
+        self.mean_pose_covariance(|group| group.variance(pose_stddev, heading_stddev))
     }
 }
 
@@ -112,7 +98,7 @@ mod tests {
     fn rings(sightings: &[Sighting]) -> Vec<Ring> {
         let mut groups = SightingGroups::default();
         sightings.iter().for_each(|sighting| groups.add(sighting, 0.1));
-        assert_eq!(groups.sightings() as usize, sightings.len());
+        assert_eq!(groups.measurements() as usize, sightings.len());
         groups.rings(0.02, 0.01).collect()
     }
 
@@ -124,18 +110,5 @@ mod tests {
         assert!((found[0].centre - Point2::new(3.05, 5.0)).norm() < 1e-9);
         let least = 0.02f64.powi(2) + (0.01f64 * 2.05).powi(2);
         assert!((found[0].variance - least).abs() < 1e-5, "{}", found[0].variance);
-    }
-
-    #[test]
-    fn a_position_ends_when_the_robot_has_moved_on() {
-        let drive: Vec<_> = (0..10).map(|step| sighting(0.06 * f64::from(step), (3.0, 5.0))).collect();
-        assert_eq!(rings(&drive).len(), 5);
-    }
-
-    #[test]
-    fn a_mean_is_weighted_by_the_precision_of_sightings() {
-        let coarse = Sighting { stddev: 0.2, ..sighting(0.0, (3.5, 5.0)) };
-        let found = rings(&[sighting(0.0, (3.0, 5.0)), coarse]);
-        assert!((found[0].centre.x - 3.1).abs() < 1e-9);
     }
 }

@@ -42,7 +42,7 @@ pub(super) struct Tag {
 impl Tag {
     /// Whether most of its ranges are from beyond the reach of a tag of short range.
     pub(super) fn is_far(&self) -> bool {
-        self.beyond >= LEAST_FAR && self.beyond > self.groups.readings()
+        self.beyond >= LEAST_FAR && self.beyond > self.groups.measurements()
     }
 
     /// Adds a range: to those from beyond the reach, or to the others.
@@ -76,7 +76,10 @@ impl Tag {
     }
 
     pub(super) fn readings(&self) -> u32 {
-        self.ranges().readings().saturating_add(self.sightings.sightings()).saturating_add(self.bearings.bearings())
+        self.ranges()
+            .measurements()
+            .saturating_add(self.sightings.measurements())
+            .saturating_add(self.bearings.measurements())
     }
 
     pub(super) fn locate(&self, parameters: &TagLocalizerParameters) -> Option<TagMode> {
@@ -87,7 +90,7 @@ impl Tag {
         let likelihood = Likelihood::new(rings, rays, outlier_share, reach);
         let mut window = parameters.window_cells(self.least_stddev);
         let mut grid = GridSize { centre: self.first_place, cells: parameters.cells(), resolution };
-        if self.readings() == self.bearings.bearings() {
+        if self.readings() == self.bearings.measurements() {
             let wide = GridSize { resolution: WIDER * resolution, ..grid };
             let about = read_out(&Posterior::new(&likelihood, wide)?, readout, window)?.position;
             let edge = 0.5 * (WIDER - 1.0) * grid.cells as f64 * resolution;
@@ -119,9 +122,9 @@ impl Tag {
     fn shared_covariance(&self, pose_stddev: f64, heading_stddev: f64) -> Matrix2<f64> {
         let ranges = self.ranges();
         let ways = [
-            (ranges.readings(), ranges.shared_covariance(pose_stddev)),
-            (self.sightings.sightings(), self.sightings.shared_covariance(pose_stddev, heading_stddev)),
-            (self.bearings.bearings(), self.bearings.shared_covariance(heading_stddev)),
+            (ranges.measurements(), ranges.shared_covariance(pose_stddev)),
+            (self.sightings.measurements(), self.sightings.shared_covariance(pose_stddev, heading_stddev)),
+            (self.bearings.measurements(), self.bearings.shared_covariance(heading_stddev)),
         ];
         let read = ways.iter().filter(|(readings, _)| *readings > 0);
         let count = read.clone().count().max(1);
