@@ -28,34 +28,6 @@ fn stage(parameters: &str, map_b: &[i8]) -> (StageHarness, DrawnMap, RobotFrames
 }
 
 #[test]
-fn bends_are_sent_before_the_frames_that_they_belong_to_and_again_when_a_map_has_grown() {
-    let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
-    let (mut stage, map, frames) = stage("", &map.deformed(0.2).cells);
-    let deformations: Vec<MapDeformation> = stage.take("deformation").unwrap();
-    assert_eq!(
-        deformations.iter().map(|deformation| deformation.robot.as_str()).collect::<Vec<_>>(),
-        ["robot1", "robot2"]
-    );
-    assert_eq!(deformations[1].header.frame_id, "robot2/map");
-    assert!(
-        deformations[1].nodes.iter().any(|node| node.dx.hypot(node.dy) > 0.05)
-            && deformations[1].nodes[0].covariance[0] > 0.0
-    );
-    assert_eq!(stage.take::<RobotFrames>("frames").unwrap(), std::slice::from_ref(&frames));
-
-    let data: Vec<u8> = map.cells.iter().map(|cell| *cell as u8).collect();
-    let message = OccupancyGrid { info: map.info(), data: &data, ..Default::default() };
-    stage.give::<OccupancyGrid<'_>>("map", "robot2", LogTime(3), &message).unwrap();
-    assert!(stage.take::<MapDeformation>("deformation").unwrap().is_empty());
-    stage.finish(LogTime(3)).unwrap();
-    let deformations: Vec<MapDeformation> = stage.take("deformation").unwrap();
-    assert!(
-        deformations.iter().flat_map(|deformation| &deformation.nodes).all(|node| node.dx.hypot(node.dy) < 0.01),
-        "it is straight by then"
-    );
-}
-
-#[test]
 fn a_map_that_comes_last_is_aligned_as_if_all_had_come_at_once() {
     let map = FloorPlan::office().draw(seen(-1.0, -1.0, 21.0, 13.0), drawing(0.0, 0.0, 0.0));
     let deformed = |most: f64| map.deformed(most).cells;
@@ -126,13 +98,4 @@ fn maps_that_have_grown_are_bent_anew_when_frames_come() {
         stage.give::<RobotFrames>("frames", "", LogTime(4), &frames).unwrap();
         assert_eq!(stage.take::<MapDeformation>("deformation").unwrap().len(), count, "{parameters}");
     }
-}
-
-#[test]
-fn a_stage_that_is_not_enabled_passes_the_frames_on_and_nothing_else() {
-    let (mut stage, map, frames) = stage("enabled = false", &[UNKNOWN; 0]);
-    drop(map);
-    assert_eq!(stage.take::<RobotFrames>("frames").unwrap(), [frames]);
-    stage.finish(LogTime(3)).unwrap();
-    assert!(stage.take::<MapDeformation>("deformation").unwrap().is_empty());
 }

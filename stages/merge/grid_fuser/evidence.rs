@@ -11,6 +11,7 @@
 //! The log-odds are integers of a small unit, so that the sums do not depend on the order of the maps.
 
 use crate::shared::geometry::UNKNOWN;
+use crate::shared::log_odds::log_odds;
 
 /// Steps of the integer log-odds per unit of the natural logarithm.
 const STEPS: f64 = 256.0;
@@ -35,7 +36,7 @@ impl EvidenceTable {
     pub fn new(min_probability: f64, max_probability: f64) -> Self {
         let steps = |probability: f64| {
             let cut = probability.max(min_probability).min(max_probability);
-            (STEPS * (cut / (1.0 - cut)).ln()).round().clamp(-MOST_STEPS, MOST_STEPS) as i32
+            (STEPS * log_odds(cut)).round().clamp(-MOST_STEPS, MOST_STEPS) as i32
         };
         let (lowest, highest) = (steps(0.0), steps(1.0));
         let value = |sum: i32| match sum {

@@ -201,9 +201,7 @@ fn in_world(drive: &Drive, placed: &Placed<'_>) -> impl Iterator<Item = PoseStam
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shared::geometry::pose;
     use gridweave_runtime::message::LogTime;
-    use gridweave_runtime::ros::Time;
     use gridweave_runtime::stage::StageHarness;
 
     fn frames(x: f64) -> RobotFrames {
@@ -256,34 +254,5 @@ mod tests {
         assert_eq!(paths(&["robot2"]), [path("robot2", 1)], "the reference until two robots are merged");
         assert_eq!(paths(&["robot1"]), [path("robot1", 1), path("robot2", 0)]);
         assert_eq!(paths(&["robot1", "robot2"]), [path("robot1", 1), path("robot2", 1)]);
-    }
-
-    #[test]
-    fn poses_are_sent_once_in_the_last_frames_each_with_its_own_time() {
-        let mut stage = StageHarness::new(&kind(), "").unwrap();
-        stage.give::<RobotFrames>("frames", "", LogTime(1), &frames(1.0)).unwrap();
-        for second in 0..4 {
-            let header = Header { stamp: Time { sec: second, nanosec: 7 }, ..Default::default() };
-            let pose = pose(f64::from(second), 0.0, 0.0).into();
-            let stamped = PoseWithCovarianceStamped::from(PoseStamped { header, pose });
-            stage.give::<PoseWithCovarianceStamped>("pose", "robot1", LogTime(2), &stamped).unwrap();
-            stage.give::<PoseWithCovarianceStamped>("pose", "robot2", LogTime(2), &stamped).unwrap();
-        }
-        stage.give::<RobotFrames>("frames", "", LogTime(3), &frames(10.0)).unwrap();
-        assert!(stage.take::<PoseStamped>("pose").unwrap().is_empty(), "the frames may change");
-        stage.finish(LogTime(4)).unwrap();
-        let messages = stage.take_messages("pose");
-        assert!(messages.iter().all(|message| message.header().topic.as_str() == "/robot1/merged_pose"));
-        let poses: Vec<PoseStamped> = messages.iter().map(|message| message.decode().unwrap()).collect();
-        let last = stage.take::<Path>("path").unwrap().pop().unwrap();
-        assert_eq!(poses, last.poses);
-        assert_eq!(poses.len(), 4);
-        for (second, pose) in (0..).zip(&poses) {
-            assert_eq!(
-                (pose.header.frame_id.as_str(), pose.header.stamp.sec, pose.header.stamp.nanosec),
-                ("world", second, 7)
-            );
-            assert!((pose.pose.position.x - f64::from(second) - 10.0).abs() < 1e-9);
-        }
     }
 }

@@ -8,14 +8,6 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 use proptest::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 
-/// The west and the east of the office, in their own frames.
-fn office_maps() -> (DrawnMap, DrawnMap) {
-    let office = FloorPlan::office();
-    let a = office.draw(seen(-0.2, -0.2, 14.0, 12.2), drawing(3.0, 2.0, 0.4));
-    let b = office.draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
-    (a, b)
-}
-
 /// A first guess that is off by a shift and a turn about the origin of map b, with a covariance as large.
 fn guess(transform_a_b: Pose2, x: f64, y: f64, yaw: f64) -> InitialGuess {
     let covariance = Matrix3::from_diagonal(&Vector3::new(0.3 * 0.3, 0.3 * 0.3, 0.05 * 0.05));
@@ -33,7 +25,7 @@ fn assert_near(found: &Pose2, truth: &Pose2, map_b: &DrawnMap) {
 
 #[test]
 fn starts_half_a_metre_and_five_degrees_off_find_the_truth() {
-    let (a, b) = office_maps();
+    let (a, b) = FloorPlan::west_and_east_of_the_office();
     let truth = a.transform_to(&b);
     for (x, y, degrees) in [(0.0, 0.0, 0.0), (0.5, 0.0, 5.0), (0.0, -0.5, 5.0), (-0.35, 0.35, -5.0), (0.3, 0.4, -5.0)] {
         let initial_guess = guess(truth, x, y, f64::to_radians(degrees));
@@ -46,7 +38,7 @@ fn starts_half_a_metre_and_five_degrees_off_find_the_truth() {
 
 #[test]
 fn registering_the_other_way_round_finds_the_inverse() {
-    let (a, b) = office_maps();
+    let (a, b) = FloorPlan::west_and_east_of_the_office();
     let truth = a.transform_to(&b);
     let initial_guess = guess(truth.inverse(), 0.2, -0.1, 0.03);
     let registration = register(&b.walls, &a.walls, &initial_guess, &IcpParameters::default());
@@ -74,7 +66,7 @@ fn moving_the_frames_moves_the_result_along() {
 
 #[test]
 fn every_metric_and_weighting_finds_the_truth() {
-    let (a, b) = office_maps();
+    let (a, b) = FloorPlan::west_and_east_of_the_office();
     let truth = a.transform_to(&b);
     for metric in [Metric::PointToLine, Metric::PointToPoint] {
         for weighting in [Weighting::GemanMcclure, Weighting::Huber, Weighting::None] {

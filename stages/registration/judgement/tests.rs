@@ -10,14 +10,6 @@ use gridweave_runtime::stage::InitialPose;
 use nalgebra::{Matrix3, Vector2};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// The west and the east of the office, in their own frames.
-fn office_maps() -> (DrawnMap, DrawnMap) {
-    let office = FloorPlan::office();
-    let a = office.draw(seen(-0.2, -0.2, 14.0, 12.2), drawing(3.0, 2.0, 0.4));
-    let b = office.draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
-    (a, b)
-}
-
 /// A hypothesis from enough tags.
 fn by_tags(transform_a_b: &Pose2) -> Hypothesis {
     Hypothesis {
@@ -147,7 +139,7 @@ fn a_refused_hypothesis_is_not_accepted_but_competes() {
 
 #[test]
 fn walls_on_free_space_are_refused() {
-    let (a, b) = office_maps();
+    let (a, b) = FloorPlan::west_and_east_of_the_office();
     let truth = a.transform_to(&b);
     for (x, y, yaw) in [(1.5, 0.0, 0.0), (0.0, 2.0, 0.0), (-1.2, 1.2, 0.0)] {
         let wrong = pose(x, y, 0.0) * truth;
@@ -178,7 +170,7 @@ fn walls_that_are_seen_from_opposite_sides_are_no_evidence() {
 
 #[test]
 fn a_region_may_be_shifted_a_little_and_not_far() {
-    let (a, b) = office_maps();
+    let (a, b) = FloorPlan::west_and_east_of_the_office();
     let truth = a.transform_to(&b);
     let evidence = |shift: f64| {
         let moved = pose(shift, 0.0, 0.0) * truth;
@@ -190,7 +182,7 @@ fn a_region_may_be_shifted_a_little_and_not_far() {
 
 #[test]
 fn acceptance_follows_from_the_required_probability() {
-    let (a, b) = office_maps();
+    let (a, b) = FloorPlan::west_and_east_of_the_office();
     let hypotheses = by_maps(&[a.transform_to(&b)]);
     for (accept, is_accepted) in [(0.0, true), (0.98, true), (1.0, false)] {
         let parameters = JudgementParameters { accept, ..Default::default() };

@@ -1,19 +1,11 @@
 //! The stage from outside: messages in, messages out.
 
 use crate::shared::geometry::{Pose2, pose};
-use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
+use crate::shared::test_world::floor_plan::{FloorPlan, drawing, seen};
 use crate::shared::test_world::stage_bench::StageBench;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Alignment, Header};
 use gridweave_runtime::stage::{Context, InitialPose, InitialPoses};
-
-/// West and east.
-fn maps() -> (DrawnMap, DrawnMap) {
-    let office = FloorPlan::office();
-    let a = office.draw(seen(-0.2, -0.2, 14.0, 12.2), drawing(3.0, 2.0, 0.4));
-    let b = office.draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
-    (a, b)
-}
 
 fn proposed(source: &str, transform_a_b: &Pose2) -> Alignment {
     let mut alignment = Alignment {
@@ -35,7 +27,7 @@ fn proposed(source: &str, transform_a_b: &Pose2) -> Alignment {
 
 #[test]
 fn hypotheses_are_judged_together_and_replace_the_earlier_ones_of_their_source() {
-    let (a, b) = maps();
+    let (a, b) = FloorPlan::west_and_east_of_the_office();
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
@@ -60,7 +52,7 @@ fn by_a_plug_in(transform_a_b: &Pose2) -> Alignment {
 
 #[test]
 fn a_wrong_plug_in_is_not_trusted_however_certain_it_is() {
-    let (a, b) = maps();
+    let (a, b) = FloorPlan::west_and_east_of_the_office();
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
@@ -73,7 +65,7 @@ fn a_wrong_plug_in_is_not_trusted_however_certain_it_is() {
 
 #[test]
 fn a_plug_in_is_trusted_where_a_search_of_the_maps_finds_the_same_pose_only() {
-    let (a, b) = maps();
+    let (a, b) = FloorPlan::west_and_east_of_the_office();
     let mut bench = StageBench::new(&super::kind(), "");
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
@@ -98,7 +90,7 @@ fn knowing(parameters: &str) -> StageBench {
 
 #[test]
 fn an_initial_pose_is_used_as_it_is_if_the_user_chooses_it() {
-    let (a, b) = maps();
+    let (a, b) = FloorPlan::west_and_east_of_the_office();
     let mut bench = knowing("hypotheses = { robot2 = 0 }");
     bench.give_map("robot1", &a);
     bench.give_map("robot2", &b);
@@ -119,7 +111,7 @@ fn an_initial_pose_is_used_as_it_is_if_the_user_chooses_it() {
 
 #[test]
 fn a_choice_that_matches_no_pair_gives_a_warning() {
-    let (a, b) = maps();
+    let (a, b) = FloorPlan::west_and_east_of_the_office();
     let warnings = |parameters: &str| {
         let mut bench = knowing(parameters);
         bench.give_map("robot1", &a);

@@ -66,11 +66,7 @@ impl FloorPlan {
 
     /// An office of 20 x 12 m: a corridor, rooms of all sizes with doors, and one slanted wall.
     pub fn office() -> Self {
-        Self::new(&[
-            [0.0, 0.0, 20.0, 0.0],
-            [20.0, 0.0, 20.0, 12.0],
-            [20.0, 12.0, 0.0, 12.0],
-            [0.0, 12.0, 0.0, 0.0],
+        Self::hall().with(&[
             [0.0, 5.0, 2.0, 5.0],
             [3.0, 5.0, 6.5, 5.0],
             [7.6, 5.0, 12.2, 5.0],
@@ -89,13 +85,16 @@ impl FloorPlan {
         ])
     }
 
+    /// What two robots map of the office, in frames of their own: its west, and its east.
+    pub fn west_and_east_of_the_office() -> (DrawnMap, DrawnMap) {
+        let a = Self::office().draw(seen(-0.2, -0.2, 14.0, 12.2), drawing(3.0, 2.0, 0.4));
+        let b = Self::office().draw(seen(5.0, -0.2, 20.2, 12.2), drawing(12.0, 6.0, -2.1));
+        (a, b)
+    }
+
     /// Another office of the same size.
     pub fn another_office() -> Self {
-        Self::new(&[
-            [0.0, 0.0, 20.0, 0.0],
-            [20.0, 0.0, 20.0, 12.0],
-            [20.0, 12.0, 0.0, 12.0],
-            [0.0, 12.0, 0.0, 0.0],
+        Self::hall().with(&[
             [0.0, 3.4, 5.0, 3.4],
             [6.2, 3.4, 15.0, 3.4],
             [10.5, 3.4, 10.5, 10.0],

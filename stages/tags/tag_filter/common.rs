@@ -41,26 +41,3 @@ pub(super) fn is_usable(tag: &TagEstimate) -> bool {
     let finite = [tag.x, tag.y, tag.certainty, xx, xy, yx, yy].iter().all(|value| value.is_finite());
     finite && xx >= 0.0 && yy >= 0.0 && !tag.tag_id.is_empty()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn tag(tag_id: &str, certainty: f64) -> TagEstimate {
-        TagEstimate { tag_id: tag_id.into(), certainty, ..Default::default() }
-    }
-
-    #[test]
-    fn estimates_that_are_not_finite_are_ignored() {
-        let good = tag("1", 0.9);
-        for bad in [
-            TagEstimate { x: f64::NAN, ..good.clone() },
-            TagEstimate { certainty: f64::NAN, ..good.clone() },
-            TagEstimate { covariance: [-1.0, 0.0, 0.0, 1.0], ..good.clone() },
-            TagEstimate { covariance: [f64::INFINITY, 0.0, 0.0, 1.0], ..good.clone() },
-            TagEstimate { tag_id: String::new(), ..good.clone() },
-        ] {
-            assert_eq!(common_tags(&[bad], std::slice::from_ref(&good), 0.75), vec![]);
-        }
-    }
-}

@@ -8,13 +8,13 @@
 
 use gridweave_published::edge_matcher::{EdgeMatcherParameters, edges, match_edges};
 use gridweave_published::entropy_fuser::{common_grid, fuse};
+use gridweave_published::log_odds::LogOdds;
 use gridweave_published::pgvd_extractor::{PgvdExtractorParameters, topological_map};
 use gridweave_published::radon_aligner::{NamedMap, PreparedMap, RadonAlignerParameters, WallPoints, align, energy};
 use gridweave_published::uncertain_transform::{UncertainTransformParameters, transform};
 use gridweave_stages::merge::grid_fuser::layout::Lattice;
 use gridweave_stages::merge::grid_fuser::{KnownArea, PlacedGrid};
 use gridweave_stages::shared::geometry::{Grid, Point2, Pose2};
-use gridweave_stages::shared::log_odds::LogOdds;
 use gridweave_stages::shared::test_world::building;
 use nalgebra::{Matrix3, UnitComplex, Vector3};
 use std::time::Instant;

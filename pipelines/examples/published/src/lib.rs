@@ -14,6 +14,7 @@ pub mod acceptance_index;
 pub mod edge_matcher;
 pub mod entropy_fuser;
 pub mod hough_spectrum_aligner;
+pub mod log_odds;
 pub mod pair_aligner;
 pub mod pgvd_extractor;
 pub mod radon_aligner;

@@ -1,7 +1,7 @@
 //! The entropy filter on cells and on maps.
 
+use crate::log_odds::LogOdds;
 use gridweave_stages::shared::geometry::{Grid, GridGeometry, UNKNOWN, is_known, most_cells_over, pose};
-use gridweave_stages::shared::log_odds::LogOdds;
 use rayon::prelude::*;
 
 /// Largest distance of cells of two maps that count as the same, in cells: the rounding errors of coordinates.

@@ -1,11 +1,11 @@
 //! The stage: keeps each robot's last map, and fuses those of placed robots.
 
 use super::{EntropyFuserParameters, common_grid, fuse};
+use crate::log_odds::LogOdds;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, OccupancyGrid, RobotFrames};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 use gridweave_stages::shared::geometry::Grid;
-use gridweave_stages::shared::log_odds::LogOdds;
 use gridweave_stages::shared::robot_maps::RobotMaps;
 
 /// Outputs of the stage.

@@ -1,8 +1,16 @@
-//! The filter, maps on one lattice, and the stage from outside.
+//! The filter.
 
 use super::*;
-use gridweave_stages::shared::log_odds::entropy;
 use proptest::prelude::*;
+
+/// Entropy of a cell that is occupied with the probability of these log-odds, in bits: 1 where nothing is known.
+fn entropy(log_odds: f64) -> f64 {
+    let of = |log_odds: f64| {
+        let probability = 1.0 / (1.0 + (-log_odds).exp());
+        if probability > 0.0 { -probability * probability.log2() } else { 0.0 }
+    };
+    of(log_odds) + of(-log_odds)
+}
 
 proptest! {
     #[test]

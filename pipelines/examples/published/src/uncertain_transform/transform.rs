@@ -1,11 +1,11 @@
 //! Algorithm 1: transforms a map into the world and blurs it there.
 
 use super::{Kernel, PointCovariance, UncertainTransformParameters, convolve};
+use crate::log_odds::LogOdds;
 use gridweave_stages::merge::grid_fuser::evidence::EvidenceTable;
 use gridweave_stages::merge::grid_fuser::layout::{Lattice, LeftOut, layout_of};
 use gridweave_stages::merge::grid_fuser::{Fused, KnownArea, PlacedGrid, inverse};
 use gridweave_stages::shared::geometry::{Grid, GridGeometry, Point2, UNKNOWN, pose};
-use gridweave_stages::shared::log_odds::LogOdds;
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 
