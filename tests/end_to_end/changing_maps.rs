@@ -1,7 +1,7 @@
 //! Maps that change their shape, their place, their resolution or their direction while they grow, or are sent in
 //! parts.
 
-use crate::support::{LogBuilder, SMALL_BUILDING, TestMap, gridweave, simulate};
+use crate::support::{LogBuilder, SMALL_BUILDING, TestMap, gridweave, json, simulate};
 use gridweave_logs::reader::{LogFile, LogReader};
 use gridweave_runtime::ros::{OccupancyGrid, OccupancyGridUpdate, RosMessage, decode, encode};
 use gridweave_tests::header;
@@ -62,7 +62,7 @@ fn merge(folder: &Path, name: &str, fill: impl FnOnce(&mut LogBuilder)) -> (Isom
     out.finish();
     let args = ["run", "map_merge", "--input", name, "--output", "out.mcap", "--summary", "summary.json"];
     gridweave(folder, &[&args[..], &["--map", "map.yaml"]].concat()).assert(0, &["merged 2 of 2"]);
-    let summary: Value = serde_json::from_slice(&fs::read(folder.join("summary.json")).unwrap()).unwrap();
+    let summary: Value = json(&folder.join("summary.json"));
     let number = |field: &str| summary["frames"]["robot2"][field].as_f64().unwrap();
     let frame = Isometry2::new(Vector2::new(number("x"), number("y")), number("yaw"));
     (frame, fs::read(folder.join("map.pgm")).unwrap())

@@ -1,6 +1,6 @@
 //! The same log, pipeline and seed give the same output, byte for byte, on every engine and any number of cores.
 
-use crate::support::{Ended, gridweave_with, simulate};
+use crate::support::{Ended, gridweave_with, json, simulate};
 use serde_json::Value;
 use std::path::Path;
 use tempfile::TempDir;
@@ -51,7 +51,7 @@ pub(crate) fn assert_same_output(folder: &Path, log: &Path, ways: &[(&str, &str)
 
 /// The summary, in which only the times of the stages may differ.
 fn summary_without_times(folder: &Path) -> Value {
-    let mut summary: Value = serde_json::from_slice(&std::fs::read(folder.join("summary.json")).unwrap()).unwrap();
+    let mut summary: Value = json(&folder.join("summary.json"));
     for stage in summary["stages"].as_object_mut().unwrap().values_mut() {
         stage.as_object_mut().unwrap().remove("busy_ms").unwrap();
     }

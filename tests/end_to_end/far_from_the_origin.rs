@@ -1,6 +1,6 @@
 //! Maps far from the origin of their frames: time and memory of a merge depend on the known area, not on that distance.
 
-use crate::support::{Ended, change_log, gridweave_program, simulate, start_program};
+use crate::support::{Ended, change_log, gridweave_program, json, simulate, start_program};
 use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage, decode, encode};
 use nalgebra::{Isometry2, Vector2};
 use serde_json::Value;
@@ -38,7 +38,7 @@ impl Far {
             Some(data.to_vec())
         });
         // The same place in the world: the frame is as far on the other side.
-        let mut true_frames: Value = serde_json::from_slice(&fs::read(&truth).unwrap()).unwrap();
+        let mut true_frames: Value = json(&truth);
         let frame = &mut true_frames["frames"]["robot2"];
         let number = |name: &str| frame[name].as_f64().unwrap();
         let near = Isometry2::new(Vector2::new(number("x"), number("y")), number("yaw"));

@@ -1,8 +1,7 @@
 //! The pipeline `group_mapping` merges what it can, and says how surely.
 
-use crate::support::{gridweave, published, published_pipeline, simulate};
+use crate::support::{evaluate, json, published, published_pipeline, simulate};
 use serde_json::Value;
-use std::fs;
 use tempfile::TempDir;
 
 #[test]
@@ -14,15 +13,14 @@ fn a_building_that_two_robots_have_seen_is_merged_by_directions_and_edges() {
     let pipeline = published_pipeline("group_mapping");
     let run = ["run", &pipeline, "--input", "in.mcap", "--output", "out.mcap", "--summary", "summary.json"];
     published(folder, &run).assert(0, &["merged 2 of 2"]);
-    let summary: Value = serde_json::from_slice(&fs::read(folder.join("summary.json")).unwrap()).unwrap();
+    let summary: Value = json(&folder.join("summary.json"));
     let alignment = &summary["alignments"][0];
     assert_eq!(alignment["method"], "radon+edges");
     let reason = alignment["reason"].as_str().unwrap();
     assert!(reason.contains("agree on the translation") && reason.contains("the directions of the walls"), "{reason}");
     assert!(summary["frames"]["robot2"]["covariance"][8].as_f64().unwrap() > 0.0, "{summary}");
 
-    let evaluated = gridweave(folder, &["evaluate", "summary.json", "--truth", "in.truth.json", "--json"]);
-    let evaluation: Value = serde_json::from_str(&evaluated.stdout).unwrap();
+    let evaluation = evaluate(folder, "in.truth.json".as_ref());
     assert_eq!((&evaluation["right"], &evaluation["wrong"]), (&Value::from(1), &Value::from(0)), "{evaluation}");
 }
 

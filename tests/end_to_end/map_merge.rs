@@ -1,6 +1,6 @@
 //! Maps are merged by the maps alone, rightly or not at all.
 
-use crate::support::{Ended, gridweave, gridweave_with, logs_in, real_logs, simulate};
+use crate::support::{Ended, evaluate, gridweave, gridweave_with, json, logs_in, real_logs, simulate};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -12,12 +12,7 @@ fn merge(folder: &Path, logs: &[&Path], more: &[&str]) -> (Ended, Value) {
     args.extend(logs.iter().flat_map(|log| ["--input", log.to_str().unwrap()]));
     args.extend(more);
     let ended = gridweave(folder, &args);
-    (ended, serde_json::from_slice(&fs::read(folder.join("summary.json")).unwrap()).unwrap())
-}
-
-fn evaluate(folder: &Path, truth: &Path) -> Value {
-    let args = ["evaluate", "summary.json", "--truth", truth.to_str().unwrap(), "--json"];
-    serde_json::from_str(&gridweave(folder, &args).stdout).unwrap()
+    (ended, json(&folder.join("summary.json")))
 }
 
 /// A part of a log: the maps of one robot.
@@ -105,7 +100,7 @@ fn without_enough_tags_a_merge_goes_by_the_maps() {
         let (log, truth) = simulate(folder.path(), "in.mcap", &args);
         let args = ["merge", log.to_str().unwrap(), "-o", "out.mcap", "--summary", "summary.json", "--results-only"];
         gridweave(folder.path(), &args).assert(0, &["merged 2 of 2"]);
-        let summary: Value = serde_json::from_slice(&fs::read(folder.path().join("summary.json")).unwrap()).unwrap();
+        let summary: Value = json(&folder.path().join("summary.json"));
         let alignment = &summary["alignments"][0];
         let method = if tags == "0" { "maps+icp" } else { "tags+directions+icp" };
         assert_eq!(alignment["method"], method, "{alignment}");

@@ -1,6 +1,6 @@
 //! Map files are merged like the maps of logs, and a merge may write its map as one.
 
-use crate::support::{Ended, TestMap, gridweave, gridweave_with, simulate};
+use crate::support::{Ended, TestMap, evaluate, gridweave, gridweave_with, json, simulate};
 use gridweave_logs::map_file::{self, GridMap};
 use gridweave_logs::picture::robot_colour;
 use gridweave_runtime::ros::{MapMetaData, OccupancyGrid, Pose, RosMessage, decode};
@@ -67,11 +67,6 @@ pub(crate) fn save_room(path: &Path) {
     map_file::save(path, &GridMap { info, cells }).unwrap();
 }
 
-fn evaluate(folder: &Path, truth: &Path) -> Value {
-    let args = ["evaluate", "summary.json", "--truth", truth.to_str().unwrap(), "--json"];
-    serde_json::from_str(&gridweave(folder, &args).stdout).unwrap()
-}
-
 #[test]
 fn map_files_give_one_map_file_and_nothing_else() {
     let (folder, truth) = map_files("1001");
@@ -128,12 +123,11 @@ fn maps_of_other_resolutions_and_turned_origins_are_merged() {
 
     let args = ["robot1.yaml", "robot2.yaml", "-o", "merged.yaml", "--summary", "summary.json"];
     merge(folder.path(), &args).assert(0, &["merged 2 of 2 robots"]);
-    let json = |path: &Path| serde_json::from_slice::<Value>(&fs::read(path).unwrap()).unwrap();
     let frame = |json: &Value, robot: &str| {
         let [x, y, yaw] = ["x", "y", "yaw"].map(|field| json["frames"][robot][field].as_f64().unwrap());
         Isometry2::new(Vector2::new(x, y), yaw)
     };
-    let (found, truth) = (json(&folder.path().join("summary.json")), json(&truth));
+    let [found, truth]: [Value; 2] = [json(&folder.path().join("summary.json")), json(&truth)];
     let expected = frame(&truth, "robot1").inverse() * frame(&truth, "robot2") * transform_turned_map.inverse();
     let error = expected.inverse() * frame(&found, "robot2");
     println!("{:.3} m and {:.4} rad off", error.translation.vector.norm(), error.rotation.angle());

@@ -1,6 +1,6 @@
 //! The paper's methods 1, 2 and 3, as the pipelines that ship: each merges, and each is as exact as it can be.
 
-use crate::support::{SMALL_BUILDING, gridweave, published, simulate, start_program};
+use crate::support::{SMALL_BUILDING, evaluate, gridweave, json, published, simulate, start_program};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -15,16 +15,11 @@ struct Errors {
     degrees: f64,
 }
 
-fn json(path: &Path) -> Value {
-    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
-}
-
 /// Merges the log of `folder` by a shipped pipeline. Gives the errors and the summary.
 fn merge(folder: &Path, pipeline: &str) -> (Errors, Value) {
     let run = ["run", pipeline, "--input", "in.mcap", "--output", "out.mcap", "--summary", "summary.json"];
     gridweave(folder, &run).assert(0, &["merged 2 of 2"]);
-    let evaluated = gridweave(folder, &["evaluate", "summary.json", "--truth", "in.truth.json", "--json"]);
-    let evaluation: Value = serde_json::from_str(&evaluated.stdout).unwrap();
+    let evaluation = evaluate(folder, "in.truth.json".as_ref());
     assert_eq!(evaluation["right"], 1, "{pipeline}: {evaluation}");
     let robot = &evaluation["robots"][0];
     let errors = Errors { metres: robot["error_m"].as_f64().unwrap(), degrees: robot["error_deg"].as_f64().unwrap() };
@@ -149,10 +144,9 @@ fn what_published_methods_propose_is_merged_only_where_the_verifier_finds_it_alo
         let run = ["run", "verified.toml", "--input", "in.mcap", "--output", "out.mcap", "--summary", "summary.json"];
         let status = published(folder, &run).status;
         assert!(matches!(status, 0 | 3), "seed {seed}: {status}");
-        let evaluated = gridweave(folder, &["evaluate", "summary.json", "--truth", "in.truth.json", "--json"]);
-        let evaluation: Value = serde_json::from_str(&evaluated.stdout).unwrap();
+        let evaluation = evaluate(folder, "in.truth.json".as_ref());
         assert_eq!(evaluation["wrong"], 0, "seed {seed}: {evaluation}");
-        let method = json(&folder.join("summary.json"))["alignments"][0]["method"].to_string();
+        let method = json::<Value>(&folder.join("summary.json"))["alignments"][0]["method"].to_string();
         assert!(method.contains("radon") || method.contains("topology"), "seed {seed}: {method}");
     }
 }

@@ -1,6 +1,6 @@
 //! A tag that one robot sees in a wrong place, as a reflection or a move of the tag makes it, does not spoil a merge.
 
-use crate::support::{change_readings, gridweave, moved_reading, place_in_map_2, simulate};
+use crate::support::{change_readings, evaluate, gridweave, json, moved_reading, place_in_map_2, simulate};
 use gridweave_runtime::ros::{CommonTags, RosMessage, decode};
 use nalgebra::Vector2;
 use serde_json::Value;
@@ -8,20 +8,15 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-fn json(path: &Path) -> Value {
-    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
-}
-
 /// Merges `log` in `folder`. Returns the last decision of the tag filter, and the measured outcome.
 fn merge(folder: &Path, log: &str) -> (CommonTags, Value) {
     let args =
         ["run", "tag_merge", "--input", log, "--output", "out.mcap", "--results-only", "--summary", "summary.json"];
     gridweave(folder, &args).assert(0, &["merged 2 of 2"]);
-    let evaluated = gridweave(folder, &["evaluate", "summary.json", "--truth", "in.truth.json", "--json"]);
     let output = fs::read(folder.join("out.mcap")).unwrap();
     let messages = mcap::MessageStream::new(&output).unwrap().map(Result::unwrap);
     let common = messages.filter(|message| schema_name(message) == CommonTags::NAME).last().unwrap();
-    (decode(&common.data).unwrap(), serde_json::from_str(&evaluated.stdout).unwrap())
+    (decode(&common.data).unwrap(), evaluate(folder, "in.truth.json".as_ref()))
 }
 
 fn schema_name<'a>(message: &'a mcap::Message<'_>) -> &'a str {

@@ -1,13 +1,12 @@
 //! Robots that localise in one map have nothing to merge.
 
-use crate::support::{Ended, LogBuilder, TestMap, gridweave};
+use crate::support::{Ended, LogBuilder, TestMap, gridweave, json};
 use gridweave_runtime::ros::{
     OccupancyGrid, Pose, PoseStamped, PoseWithCovarianceStamped, TFMessage, Transform, TransformStamped,
 };
 use gridweave_tests::header;
 use nalgebra::{Isometry2, Vector2};
 use serde_json::Value;
-use std::fs;
 use tempfile::TempDir;
 
 const SENTENCE: &str = "robot1 and robot2 localise in one map, `/map`, in frame `map`";
@@ -87,7 +86,7 @@ fn of_robots_that_localise_in_one_map_it_is_said_that_nothing_is_to_be_merged() 
         let ended = merge(&folder);
         ended.assert(3, &["not merged: robot1: ", "not merged: robot2: ", SENTENCE, "there is nothing to merge"]);
         assert_says_nothing_of_tags(&ended);
-        let summary: Value = serde_json::from_slice(&fs::read(folder.path().join("out.json")).unwrap()).unwrap();
+        let summary: Value = json(&folder.path().join("out.json"));
         assert!(summary["unmerged"]["robot2"].as_str().unwrap().starts_with(SENTENCE), "{summary}");
         let info = gridweave(folder.path(), &["info", "in.mcap"]);
         info.assert(0, &[SENTENCE, "there is nothing to merge"]);

@@ -4,7 +4,7 @@
 //! the robots' maps can be merged.
 
 use crate::engines_agree::{FAR_APART, assert_same_output};
-use crate::support::{gridweave, logs_in, real_logs};
+use crate::support::{evaluate, logs_in, real_logs};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -26,8 +26,7 @@ fn every_pair_with_a_truth_is_right_on_every_engine_and_no_other_is_merged() {
             continue;
         }
         assert_eq!(ended.status, 0, "{name}: {ended:#?}");
-        let args = ["evaluate", "summary.json", "--truth", truth.to_str().unwrap(), "--json"];
-        let evaluation: Value = serde_json::from_str(&gridweave(folder.path(), &args).stdout).unwrap();
+        let evaluation = evaluate(folder.path(), &truth);
         println!("{name}: {evaluation}");
         assert_eq!((&evaluation["wrong"], &evaluation["refused"]), (&Value::from(0), &Value::from(0)), "{name}");
         let robots = evaluation["robots"].as_array().unwrap();

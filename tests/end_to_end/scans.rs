@@ -1,6 +1,6 @@
 //! Robots that have scans of their lidars, and no maps.
 
-use crate::support::{Ended, LogBuilder, gridweave, simulate};
+use crate::support::{Ended, LogBuilder, evaluate, gridweave, simulate};
 use gridweave_runtime::ros::{
     Header, LaserScan, Odometry, PoseStamped, RosMessage, TFMessage, TransformStamped, decode,
 };
@@ -23,8 +23,7 @@ fn merge(folder: &Path) -> Ended {
 
 /// How many pairs of robots were merged rightly, and how many wrongly.
 fn judged(folder: &Path) -> [Value; 2] {
-    let evaluated = gridweave(folder, &["evaluate", "summary.json", "--truth", "in.truth.json", "--json"]);
-    let evaluation: Value = serde_json::from_str(&evaluated.stdout).unwrap();
+    let evaluation = evaluate(folder, "in.truth.json".as_ref());
     ["right", "wrong"].map(|key| evaluation[key].clone())
 }
 

@@ -1,7 +1,7 @@
 //! Tags as robots log them: ranges in messages of other types, signal strengths, tags that a camera sees, and logs of
 //! tags without maps.
 
-use crate::support::{Ended, LogBuilder, gridweave, simulate};
+use crate::support::{Ended, LogBuilder, gridweave, json, simulate};
 use gridweave_logs::reader::{LogFile, LogReader};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{
@@ -158,7 +158,7 @@ fn fields_of_any_message_are_ranges_or_signal_strengths_of_tags() {
 #[test]
 fn tags_that_a_camera_sees_merge_maps() {
     let world = World::new();
-    let truth: Value = serde_json::from_slice(&fs::read(&world.truth).unwrap()).unwrap();
+    let truth: Value = json(&world.truth);
     let number = |value: &Value| value.as_f64().unwrap();
     let transform_world_map = |robot: &str| {
         let frame = &truth["frames"][robot];
@@ -237,7 +237,7 @@ fn merged_drives(
     own_pipeline(folder.path(), "tag_frames", robots);
     let run = ["run", "own.toml", "--input", "in.mcap", "--output", "out.mcap", "--summary", "summary.json"];
     gridweave(folder.path(), &[&run, args].concat()).assert(0, &["merged 2 of 2"]);
-    let summary: Value = serde_json::from_slice(&fs::read(folder.path().join("summary.json")).unwrap()).unwrap();
+    let summary: Value = json(&folder.path().join("summary.json"));
     let number = |field: &str| summary["frames"]["robot2"][field].as_f64().unwrap();
     let found = Isometry2::new(Vector2::new(number("x"), number("y")), number("yaw"));
     let file = LogFile::open(folder.path().join("out.mcap")).unwrap();

@@ -1,6 +1,6 @@
 //! The pipeline `topological` merges topological maps of logs, and `topology_file_merge` those that were drawn by hand.
 
-use crate::support::{gridweave, simulate};
+use crate::support::{evaluate, gridweave, json, simulate};
 use serde_json::Value;
 use std::fs;
 use tempfile::TempDir;
@@ -13,12 +13,11 @@ fn a_building_that_two_robots_have_seen_is_merged_by_its_ways() {
     simulate(folder, "in.mcap", &world);
     let run = ["run", "topological", "--input", "in.mcap", "--output", "out.mcap", "--summary", "summary.json"];
     gridweave(folder, &run).assert(0, &["merged 2 of 2"]);
-    let summary: Value = serde_json::from_slice(&fs::read(folder.join("summary.json")).unwrap()).unwrap();
+    let summary: Value = json(&folder.join("summary.json"));
     let reason = summary["alignments"][0]["reason"].as_str().unwrap();
     assert!(reason.contains("paths coincide"), "{reason}");
 
-    let evaluated = gridweave(folder, &["evaluate", "summary.json", "--truth", "in.truth.json", "--json"]);
-    let evaluation: Value = serde_json::from_str(&evaluated.stdout).unwrap();
+    let evaluation = evaluate(folder, "in.truth.json".as_ref());
     assert_eq!((&evaluation["right"], &evaluation["wrong"]), (&Value::from(1), &Value::from(0)), "{evaluation}");
 }
 
@@ -51,7 +50,7 @@ fn topological_maps_in_json_files_are_aligned() {
     let run = ["run", "topology_file_merge", "--input", "a.json", "--input", "b.json", "--output", "out.mcap"];
     let run = [&run[..], &["--summary", "summary.json"]].concat();
     gridweave(folder, &run).assert(0, &["merged 2 of 2"]);
-    let summary: Value = serde_json::from_slice(&fs::read(folder.join("summary.json")).unwrap()).unwrap();
+    let summary: Value = json(&folder.join("summary.json"));
     let frame = |key: &str| summary["frames"]["b"][key].as_f64().unwrap();
     // The inverse of the turn and the move.
     let (x, y, yaw) = (frame("x"), frame("y"), frame("yaw").to_degrees());

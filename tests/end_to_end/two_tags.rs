@@ -1,6 +1,8 @@
 //! Two common tags merge two maps if the directions and the walls of the maps confirm them, and never wrongly.
 
-use crate::support::{Ended, LogBuilder, change_readings, gridweave, moved_reading, place_in_map_2, simulate};
+use crate::support::{
+    Ended, LogBuilder, change_readings, evaluate, gridweave, json, moved_reading, place_in_map_2, simulate,
+};
 use nalgebra::{Point2, Vector2};
 use serde_json::Value;
 use std::fs;
@@ -44,9 +46,8 @@ impl World {
             "summary.json",
         ];
         let ended = gridweave(self.path(), &[&args, more].concat());
-        let evaluated = gridweave(self.path(), &["evaluate", "summary.json", "--truth", "in.truth.json", "--json"]);
-        let alignment = json(&self.path().join("summary.json"))["alignments"][0].clone();
-        (ended, alignment, serde_json::from_str(&evaluated.stdout).unwrap())
+        let alignment = json::<Value>(&self.path().join("summary.json"))["alignments"][0].clone();
+        (ended, alignment, evaluate(self.path(), "in.truth.json".as_ref()))
     }
 
     /// The log as it would be if the tags of robot 2's map were elsewhere.
@@ -62,10 +63,6 @@ impl World {
         });
         log
     }
-}
-
-fn json(path: &Path) -> Value {
-    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
 #[track_caller]

@@ -143,28 +143,32 @@ pub(super) fn run(args: &NoiseArgs, registry: &Registry, results: &mut Results) 
     properties.iter().try_for_each(|property| sweep(&property.sweep(), args, registry, results))
 }
 
+/// The columns of a table, but for the first.
+const HEADS: [&str; 18] = [
+    "right",
+    "wrong",
+    "refused",
+    "right, 95 % interval",
+    "error m, median",
+    "95 %",
+    "error deg, median",
+    "95 %",
+    "within the covariance's 95 %",
+    "common places m, rigid: median",
+    "90 %",
+    "bent: median",
+    "90 %",
+    "wrong by the best rigid frame",
+    "deg from it, median",
+    "95 %",
+    "within the covariance's 95 % of it",
+    "wrong by the common places",
+];
+
+const OUTCOMES: [RobotOutcome; 3] = [RobotOutcome::Right, RobotOutcome::Wrong, RobotOutcome::Refused];
+
 fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Results) -> Result<()> {
-    let heads = [
-        "right",
-        "wrong",
-        "refused",
-        "right, 95 % interval",
-        "error m, median",
-        "95 %",
-        "error deg, median",
-        "95 %",
-        "within the covariance's 95 %",
-        "common places m, rigid: median",
-        "90 %",
-        "bent: median",
-        "90 %",
-        "wrong by the best rigid frame",
-        "deg from it, median",
-        "95 %",
-        "within the covariance's 95 % of it",
-        "wrong by the common places",
-    ];
-    let mut table = Table::new(std::iter::once(sweep.axis).chain(heads));
+    let mut table = Table::new(std::iter::once(sweep.axis).chain(HEADS));
     let mut data = Table::new([
         sweep.axis,
         "seed",
@@ -182,71 +186,14 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
     let mut bands: [Vec<(f64, f64, f64)>; 3] = Default::default();
     for &value in sweep.values {
         let trials = trials(sweep, value, args, registry)?;
-        let outcomes = [RobotOutcome::Right, RobotOutcome::Wrong, RobotOutcome::Refused];
-        let counts = outcomes.map(|outcome| trials.iter().filter(|trial| trial.outcome == outcome).count());
+        let counts = OUTCOMES.map(|outcome| trials.iter().filter(|trial| trial.outcome == outcome).count());
         for ((share, band), count) in shares.iter_mut().zip(&mut bands).zip(counts) {
             let (low, high) = wilson_interval(count, trials.len());
             share.push((value, count as f64 / trials.len() as f64));
             band.push((value, low, high));
         }
-        let (low, high) = wilson_interval(counts[0], trials.len());
-        let errors = |error: fn(&Trial) -> Option<f64>| trials.iter().filter_map(error).collect::<Vec<f64>>();
-        let (metres, degrees) = (errors(|trial| trial.error_m), errors(|trial| trial.error_deg));
-        let normalised = errors(|trial| trial.normalised);
-        let within = normalised.iter().filter(|error| **error < NORMALISED_95).count();
-        let common_parts: [fn(&CommonPlaces) -> f64; 4] = [
-            |places| places.rigid.median_m,
-            |places| places.rigid.p90_m,
-            |places| places.deformed.unwrap_or(places.rigid).median_m,
-            |places| places.deformed.unwrap_or(places.rigid).p90_m,
-        ];
-        let common = common_parts.map(|part| {
-            median(&trials.iter().filter_map(|trial| trial.common.as_ref().map(part)).collect::<Vec<f64>>())
-        });
-        let from_best: Vec<FromBest> =
-            trials.iter().filter_map(|trial| trial.common.as_ref().and_then(|common| common.from_best)).collect();
-        let wrong_by_best =
-            from_best.iter().filter(|best| best.metres >= RIGHT_METRES || best.degrees >= RIGHT_DEGREES);
-        let degrees_from_best: Vec<f64> = from_best.iter().map(|best| best.degrees).collect();
-        let of_best: Vec<f64> = from_best.iter().filter_map(|best| best.normalised_error_squared).collect();
-        let within_best = of_best.iter().filter(|error| **error < NORMALISED_95).count();
-        let wrong_by_places =
-            trials.iter().filter(|trial| trial.common.as_ref().is_some_and(is_wrong_by_places)).count();
-        let number = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "-".to_owned() };
-        table.row(
-            [format!("{value}")]
-                .into_iter()
-                .chain(counts.map(|count| count.to_string()))
-                .chain([format!("{:.0} % to {:.0} %", 100.0 * low, 100.0 * high)])
-                .chain(
-                    [median(&metres), quantile(&metres, 0.95), median(&degrees), quantile(&degrees, 0.95)].map(number),
-                )
-                .chain([format!("{within} of {}", normalised.len())])
-                .chain(common.map(number))
-                .chain([wrong_by_best.count().to_string()])
-                .chain([median(&degrees_from_best), quantile(&degrees_from_best, 0.95)].map(number))
-                .chain([format!("{within_best} of {}", of_best.len()), wrong_by_places.to_string()]),
-        );
-        for trial in trials {
-            let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.6}"));
-            let Trial { seed, outcome, error_m, error_deg, normalised, reason, common } = trial;
-            let from_best = common.and_then(|common| common.from_best);
-            let rigid = common.map(|common| common.rigid);
-            let words = outcome.words().to_owned();
-            data.row([
-                value.to_string(),
-                seed.to_string(),
-                words,
-                number(error_m),
-                number(error_deg),
-                number(normalised),
-                number(from_best.map(|best| best.metres)),
-                number(from_best.map(|best| best.degrees)),
-                number(rigid.map(|rigid| rigid.median_m)),
-                number(rigid.map(|rigid| rigid.p90_m)),
-                reason,
-            ]);
-        }
+        table.row(std::iter::once(value.to_string()).chain(summary(&trials, counts)));
+        trials.into_iter().for_each(|trial| data.row(trial.row(value)));
     }
     let name = format!("noise_{}", sweep.name);
     results.table(&name, &format!("## {}", sweep.title), &table)?;
@@ -259,6 +206,62 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
         shape: Shape::Lines(series.map(|((name, share), band)| Series::new(name, share).with_band(band)).collect()),
     };
     results.plot(&name, &plot)
+}
+
+/// What many worlds come to: the cells below [`HEADS`].
+fn summary(trials: &[Trial], counts: [usize; 3]) -> Vec<String> {
+    let number = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "-".to_owned() };
+    let within = |normalised: &[f64]| {
+        let within = normalised.iter().filter(|error| **error < NORMALISED_95).count();
+        format!("{within} of {}", normalised.len())
+    };
+    let errors = |error: fn(&Trial) -> Option<f64>| trials.iter().filter_map(error).collect::<Vec<f64>>();
+    let (metres, degrees) = (errors(|trial| trial.error_m), errors(|trial| trial.error_deg));
+    let places: Vec<&CommonPlaces> = trials.iter().filter_map(|trial| trial.common.as_ref()).collect();
+    let common_parts: [fn(&CommonPlaces) -> f64; 4] = [
+        |places| places.rigid.median_m,
+        |places| places.rigid.p90_m,
+        |places| places.deformed.unwrap_or(places.rigid).median_m,
+        |places| places.deformed.unwrap_or(places.rigid).p90_m,
+    ];
+    let common = common_parts.map(|part| median(&places.iter().map(|places| part(places)).collect::<Vec<f64>>()));
+    let best: Vec<FromBest> = places.iter().filter_map(|places| places.from_best).collect();
+    let is_wrong = |best: &&FromBest| best.metres >= RIGHT_METRES || best.degrees >= RIGHT_DEGREES;
+    let turned: Vec<f64> = best.iter().map(|best| best.degrees).collect();
+    let (low, high) = wilson_interval(counts[0], trials.len());
+
+    let mut cells = counts.map(|count| count.to_string()).to_vec();
+    cells.push(format!("{:.0} % to {:.0} %", 100.0 * low, 100.0 * high));
+    cells.extend([median(&metres), quantile(&metres, 0.95), median(&degrees), quantile(&degrees, 0.95)].map(number));
+    cells.push(within(&errors(|trial| trial.normalised)));
+    cells.extend(common.map(number));
+    cells.push(best.iter().filter(is_wrong).count().to_string());
+    cells.extend([median(&turned), quantile(&turned, 0.95)].map(number));
+    cells.push(within(&best.iter().filter_map(|best| best.normalised_error_squared).collect::<Vec<f64>>()));
+    cells.push(places.iter().filter(|places| is_wrong_by_places(places)).count().to_string());
+    cells
+}
+
+impl Trial {
+    /// The row of a world with a value.
+    fn row(self, value: f64) -> [String; 11] {
+        let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.6}"));
+        let from_best = self.common.and_then(|common| common.from_best);
+        let rigid = self.common.map(|common| common.rigid);
+        [
+            value.to_string(),
+            self.seed.to_string(),
+            self.outcome.words().to_owned(),
+            number(self.error_m),
+            number(self.error_deg),
+            number(self.normalised),
+            number(from_best.map(|best| best.metres)),
+            number(from_best.map(|best| best.degrees)),
+            number(rigid.map(|rigid| rigid.median_m)),
+            number(rigid.map(|rigid| rigid.p90_m)),
+            self.reason,
+        ]
+    }
 }
 
 /// Whether places that both robots have driven through are farther apart by the rigid frames than they must be: by half

@@ -1,6 +1,6 @@
 //! Live runs in folders of their own, and what they have found.
 
-use super::{Ended, Running, left_over, outcome, processes, run_name, signal, simulate, start, wait_until};
+use super::{Ended, Running, json, left_over, outcome, processes, run_name, signal, simulate, start, wait_until};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -158,7 +158,7 @@ impl Done {
     }
 
     pub(crate) fn summary(&self) -> Value {
-        serde_json::from_slice(&fs::read(self.path(SUMMARY)).unwrap()).unwrap()
+        json(&self.path(SUMMARY))
     }
 
     /// Numbers that the summary has of a stage; what it leaves out is 0.

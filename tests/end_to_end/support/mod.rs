@@ -233,6 +233,19 @@ pub(crate) fn simulate(folder: &Path, name: &str, args: &[&str]) -> (PathBuf, Pa
     (log, truth)
 }
 
+/// A JSON file.
+#[track_caller]
+pub(crate) fn json<T: serde::de::DeserializeOwned>(path: &Path) -> T {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+/// What `evaluate` says of `summary.json` in `folder`.
+#[track_caller]
+pub(crate) fn evaluate(folder: &Path, truth: &Path) -> serde_json::Value {
+    let args = ["evaluate", "summary.json", "--truth", truth.to_str().unwrap(), "--json"];
+    serde_json::from_str(&gridweave(folder, &args).stdout).unwrap()
+}
+
 /// The folder with real logs, which the environment must name.
 pub(crate) fn real_logs() -> PathBuf {
     let folder = std::env::var_os("GRIDWEAVE_LOGS");

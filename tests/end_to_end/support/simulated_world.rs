@@ -1,8 +1,7 @@
 //! Two simulated robots, whose log is merged.
 
-use super::{Ended, gridweave, simulate};
+use super::{Ended, gridweave, json, simulate};
 use gridweave_logs::summary::{Frame, Summary};
-use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
@@ -30,13 +29,13 @@ impl SimulatedWorld {
 
     /// Where robot 2 is by the truth.
     pub(crate) fn truth(&self) -> Frame {
-        let truth: Summary = serde_json::from_slice(&fs::read(&self.truth).unwrap()).unwrap();
+        let truth: Summary = json(&self.truth);
         truth.frames["robot2"]
     }
 
     /// What the last merge has found.
     pub(crate) fn summary(&self) -> Summary {
-        serde_json::from_slice(&fs::read(self.folder.path().join("summary.json")).unwrap()).unwrap()
+        json(&self.folder.path().join("summary.json"))
     }
 
     /// Error of the pose of robot 2, metres.
