@@ -88,22 +88,6 @@ fn two_tags_merge_and_the_summary_says_what_the_merge_rests_on() {
 }
 
 #[test]
-fn the_paper_asks_for_three_tags() {
-    let world = World::new();
-    assert_refused(&world.merge(&world.log, &["--set", "common_tags.min_tags=3"]), "3 are needed");
-}
-
-#[test]
-fn tags_that_are_farther_apart_in_one_map_are_refused() {
-    let world = World::new();
-    let log = world.with_tags_at(|tag, places| match tag {
-        0 => places[0] + (places[1] - places[0]).normalize() * 0.7,
-        _ => places[1],
-    });
-    assert_refused(&world.merge(&log, &[]), "the same ids");
-}
-
-#[test]
 fn tags_that_are_turned_against_the_walls_are_refused() {
     let world = World::new();
     let log = world.with_tags_at(|tag, places| {

@@ -1,7 +1,7 @@
 //! Inputs of `grid_fuser`: maps and their poses.
 
-use super::Case;
 use super::drawing::{FloorPlan, View};
+use super::{Case, pair};
 use gridweave_runtime::ros::{RobotFrame, RobotFrames, UnmergedRobot};
 use gridweave_stages::shared::geometry::{Pose2, pose};
 use gridweave_tests::{LogBuilder, TestMap, header};
@@ -30,8 +30,7 @@ pub(super) fn cases() -> Vec<Case> {
         }),
         case("turned_origin", |log| {
             let turned = grid(3, &[100, 0, 0, 0, 0, 50]).at(2.0, 0.0, FRAC_PI_2);
-            log.map(1.0, "robot1", &turned);
-            log.map(2.0, "robot2", &grid(2, &[20, 30]).at(0.0, 0.0, PI));
+            pair(log, &turned, &grid(2, &[20, 30]).at(0.0, 0.0, PI));
             place(log, 3.0, &[("robot1", Pose2::identity()), ("robot2", pose(5.0, 2.0, 0.0))]);
         }),
         case("two_resolutions", |log| {
@@ -117,8 +116,7 @@ pub(super) fn place(log: &mut LogBuilder, seconds: f64, placed: &[(&str, Pose2)]
 /// lies apart, makes the cells of the output those of whole numbers.
 fn equations_14_and_15(log: &mut LogBuilder) {
     let cells: Vec<i8> = (0..25).map(|index| if index % 2 == 0 { 10 } else { 20 }).collect();
-    log.map(1.0, "robot1", &grid(1, &[40]).at(255.0, 163.0, 0.0));
-    log.map(2.0, "robot2", &grid(5, &cells).at(97.5, 97.5, 0.0));
+    pair(log, &grid(1, &[40]).at(255.0, 163.0, 0.0), &grid(5, &cells).at(97.5, 97.5, 0.0));
     let turn = Isometry2::rotation(30_f64.to_radians());
     let transform = Translation2::new(300.0, 300.0) * turn * Translation2::new(-200.0, -200.0);
     place(log, 3.0, &[("robot1", Pose2::identity()), ("robot2", transform)]);
@@ -156,8 +154,7 @@ fn evidence(log: &mut LogBuilder) {
 /// One row for each of two maps, and then of three: what is known to one, what agrees, and what contradicts, surely and
 /// less so.
 fn conflicts(log: &mut LogBuilder) {
-    log.map(1.0, "robot1", &grid(9, &[0, -1, 0, 100, 100, 70, 70, 50, 100]));
-    log.map(2.0, "robot2", &grid(9, &[-1, 100, 0, 100, 0, 0, 30, 100, 30]));
+    pair(log, &grid(9, &[0, -1, 0, 100, 100, 70, 70, 50, 100]), &grid(9, &[-1, 100, 0, 100, 0, 0, 30, 100, 30]));
     log.map(3.0, "robot3", &grid(9, &[-1, 0, 100, 50, -1, 70, -1, 0, 0]));
     let all = ["robot1", "robot2", "robot3"].map(|robot| (robot, Pose2::identity()));
     place(log, 4.0, &all[..2]);

@@ -1,7 +1,7 @@
 //! Inputs of the stages of group mapping, from the rotation to the fused map.
 
-use super::Case;
 use super::drawing::{FloorPlan, View};
+use super::{Case, pair};
 use gridweave_runtime::ros::{
     Alignment, Point, RobotFrame, RobotFrames, TopologicalMap, TopologicalNode, TopologicalPath,
 };
@@ -24,12 +24,10 @@ fn radon_aligner() -> Vec<Case> {
             log.map(2.0, "robot2", &FloorPlan::office().draw(&View { grid_yaw: -1.1, resolution: 0.08, ..right() }));
         }),
         case("another_building", |log| {
-            log.map(1.0, "robot1", &FloorPlan::office().draw(&left()));
-            log.map(2.0, "robot2", &FloorPlan::another_office().draw(&right()));
+            pair(log, &FloorPlan::office().draw(&left()), &FloorPlan::another_office().draw(&right()))
         }),
         case("nothing_to_align", |log| {
-            log.map(1.0, "robot1", &FloorPlan::office().draw(&left()));
-            log.map(2.0, "robot2", &TestMap::filled(100, 80, CELL, 0));
+            pair(log, &FloorPlan::office().draw(&left()), &TestMap::filled(100, 80, CELL, 0));
             log.map(3.0, "robot2", &TestMap::filled(100, 80, CELL, UNKNOWN));
             log.map(4.0, "robot2", &TestMap::filled(0, 0, CELL, 0));
             let mut point = TestMap::filled(100, 80, CELL, 0);
@@ -81,8 +79,7 @@ fn entropy_fuser() -> Vec<Case> {
             place(log, 2.0, &all);
         }),
         case("another_lattice", |log| {
-            log.map(1.0, "robot1", &row_of(&[0, 100]));
-            log.map(2.0, "robot2", &row_of(&[100, 0]).at(0.5, 0.0, 0.0));
+            pair(log, &row_of(&[0, 100]), &row_of(&[100, 0]).at(0.5, 0.0, 0.0));
             log.map(3.0, "robot3", &row_of(&[100, 0]).at(1.0, -1.0, 0.0));
             let all = ["robot1", "robot2", "robot3"].map(|robot| (robot, Pose2::identity(), [0.0; 3]));
             place(log, 3.0, &all);
@@ -158,8 +155,7 @@ fn truth() -> Pose2 {
 }
 
 fn maps(log: &mut LogBuilder) {
-    log.map(1.0, "robot1", &FloorPlan::office().draw(&left()));
-    log.map(2.0, "robot2", &FloorPlan::office().draw(&right()));
+    pair(log, &FloorPlan::office().draw(&left()), &FloorPlan::office().draw(&right()));
 }
 
 /// One row of cells of one metre.

@@ -1,8 +1,8 @@
 //! Inputs of `hough_spectrum_aligner`: maps of two robots.
 
-use super::Case;
 use super::drawing::{FloorPlan, View};
 use super::map_aligner::{left, maps, place, right};
+use super::{Case, pair};
 use gridweave_stages::shared::geometry::UNKNOWN;
 use gridweave_tests::TestMap;
 
@@ -16,16 +16,9 @@ pub(super) fn cases() -> Vec<Case> {
         }),
         case("same_after_half_a_turn", |log| {
             let hall = FloorPlan::room([0.5, 0.5], [13.5, 9.5]);
-            log.map(1.0, "robot1", &hall.draw(&left()));
-            log.map(2.0, "robot2", &hall.draw(&right()));
+            pair(log, &hall.draw(&left()), &hall.draw(&right()));
         }),
-        case("another_building", |log| {
-            log.map(1.0, "robot1", &place().draw(&left()));
-            log.map(2.0, "robot2", &FloorPlan::another_office().draw(&right()));
-        }),
-        case("empty_map", |log| {
-            log.map(1.0, "robot1", &place().draw(&left()));
-            log.map(2.0, "robot2", &TestMap::filled(100, 80, 0.1, UNKNOWN));
-        }),
+        case("another_building", |log| pair(log, &place().draw(&left()), &FloorPlan::another_office().draw(&right()))),
+        case("empty_map", |log| pair(log, &place().draw(&left()), &TestMap::filled(100, 80, 0.1, UNKNOWN))),
     ]
 }

@@ -1,7 +1,7 @@
 //! Inputs of `icp_refiner`: maps of two robots, and an initial guess of their relative pose.
 
-use super::Case;
 use super::drawing::{FloorPlan, View};
+use super::{Case, pair};
 use gridweave_runtime::ros::Alignment;
 use gridweave_stages::shared::geometry::{Pose2, pose};
 use gridweave_tests::{LogBuilder, TestMap, header};
@@ -18,8 +18,7 @@ pub(super) fn cases() -> Vec<Case> {
             let office = FloorPlan::office();
             let left = View { grid_yaw: 0.6, ..left() };
             let right = View { grid_yaw: -1.1, resolution: 0.08, ..right() };
-            log.map(1.0, "robot1", &office.draw(&left));
-            log.map(2.0, "robot2", &office.draw(&right));
+            pair(log, &office.draw(&left), &office.draw(&right));
             guess(log, 3.0, &off(&truth(), 0.15, -0.1, 0.03));
         }),
         case("no_overlap", |log| {
@@ -39,8 +38,7 @@ pub(super) fn cases() -> Vec<Case> {
             guess(log, 3.0, &off(&truth(), 0.9, 0.0, 0.0));
         }),
         case("empty_map", |log| {
-            log.map(1.0, "robot1", &FloorPlan::office().draw(&left()));
-            log.map(2.0, "robot2", &TestMap::filled(100, 80, CELL, 0));
+            pair(log, &FloorPlan::office().draw(&left()), &TestMap::filled(100, 80, CELL, 0));
             guess(log, 3.0, &truth());
             log.map(4.0, "robot2", &TestMap::filled(100, 80, CELL, -1));
             log.map(5.0, "robot2", &TestMap::filled(0, 0, CELL, 0));
@@ -48,13 +46,11 @@ pub(super) fn cases() -> Vec<Case> {
         case("one_point", |log| {
             let mut point = TestMap::filled(100, 80, CELL, 0);
             point.cells[40 * 100 + 50] = 100;
-            log.map(1.0, "robot1", &FloorPlan::office().draw(&left()));
-            log.map(2.0, "robot2", &point);
+            pair(log, &FloorPlan::office().draw(&left()), &point);
             guess(log, 3.0, &truth());
         }),
         case("all_occupied", |log| {
-            log.map(1.0, "robot1", &TestMap::filled(160, 140, CELL, 100));
-            log.map(2.0, "robot2", &TestMap::filled(160, 140, CELL, 100));
+            pair(log, &TestMap::filled(160, 140, CELL, 100), &TestMap::filled(160, 140, CELL, 100));
             guess(log, 3.0, &pose(0.0, 0.0, 0.0));
         }),
         case("refused_first_guess", |log| {
@@ -105,8 +101,7 @@ pub(super) fn truth() -> Pose2 {
 }
 
 pub(super) fn maps(log: &mut LogBuilder) {
-    log.map(1.0, "robot1", &FloorPlan::office().draw(&left()));
-    log.map(2.0, "robot2", &FloorPlan::office().draw(&right()));
+    pair(log, &FloorPlan::office().draw(&left()), &FloorPlan::office().draw(&right()));
 }
 
 /// Two maps of one office that share most of it, and a guess that is off by 0.14 m and 1.1 degrees.

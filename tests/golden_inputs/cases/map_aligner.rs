@@ -1,7 +1,7 @@
 //! Inputs of `map_aligner`: maps of two robots or more.
 
-use super::Case;
 use super::drawing::{FloorPlan, View};
+use super::{Case, pair};
 use gridweave_stages::shared::geometry::{Pose2, UNKNOWN, pose};
 use gridweave_tests::{LogBuilder, TestMap};
 
@@ -19,43 +19,33 @@ pub(super) fn cases() -> Vec<Case> {
         case("not_provisional", maps),
         case("same_after_half_a_turn", |log| {
             let hall = FloorPlan::room([0.5, 0.5], [13.5, 9.5]);
-            log.map(1.0, "robot1", &hall.draw(&left()));
-            log.map(2.0, "robot2", &hall.draw(&right()));
+            pair(log, &hall.draw(&left()), &hall.draw(&right()));
         }),
         case("bare_corridor", |log| {
             let corridor = FloorPlan::new(&[[0.0, 0.5, 30.0, 0.5], [0.0, 2.5, 30.0, 2.5]]);
             log.map(1.0, "robot1", &corridor.draw(&View::of([0.0, 0.0], [24.0, 3.0], CELL)));
             log.map(2.0, "robot2", &corridor.draw(&View { high: [30.0, 3.0], ..right() }));
         }),
-        case("another_building", |log| {
-            log.map(1.0, "robot1", &place().draw(&left()));
-            log.map(2.0, "robot2", &FloorPlan::another_office().draw(&right()));
-        }),
+        case("another_building", |log| pair(log, &place().draw(&left()), &FloorPlan::another_office().draw(&right()))),
         case("a_corner_in_common", |log| {
             log.map(1.0, "robot1", &place().draw(&View { high: [3.0, 3.0], ..left() }));
             log.map(2.0, "robot2", &place().draw(&View { low: [-0.2, -0.2], high: [4.0, 2.5], ..right() }));
         }),
         case("empty_map", |log| {
-            log.map(1.0, "robot1", &place().draw(&left()));
-            log.map(2.0, "robot2", &TestMap::filled(100, 80, CELL, 0));
+            pair(log, &place().draw(&left()), &TestMap::filled(100, 80, CELL, 0));
             log.map(3.0, "robot2", &TestMap::filled(100, 80, CELL, UNKNOWN));
             log.map(4.0, "robot2", &TestMap::filled(0, 0, CELL, 0));
         }),
         case("one_point", |log| {
             let mut point = TestMap::filled(100, 80, CELL, 0);
             point.cells[40 * 100 + 50] = 100;
-            log.map(1.0, "robot1", &place().draw(&left()));
-            log.map(2.0, "robot2", &point);
+            pair(log, &place().draw(&left()), &point);
         }),
-        case("all_occupied", |log| {
-            log.map(1.0, "robot1", &TestMap::filled(80, 70, CELL, 100));
-            log.map(2.0, "robot2", &TestMap::filled(80, 70, CELL, 100));
-        }),
+        case("all_occupied", |log| pair(log, &TestMap::filled(80, 70, CELL, 100), &TestMap::filled(80, 70, CELL, 100))),
         case("too_long", |log| {
             let mut long = TestMap::filled(5000, 2, CELL, UNKNOWN);
             (long.cells[0], long.cells[4999]) = (100, 100);
-            log.map(1.0, "robot1", &place().draw(&left()));
-            log.map(2.0, "robot2", &long);
+            pair(log, &place().draw(&left()), &long);
         }),
         case("not_a_map", |log| {
             log.raw(1.0, "/robot1/map", "nav_msgs/msg/OccupancyGrid", &[0, 1, 0, 0, 9]);
@@ -113,6 +103,5 @@ pub(super) fn place() -> FloorPlan {
 }
 
 pub(super) fn maps(log: &mut LogBuilder) {
-    log.map(1.0, "robot1", &place().draw(&left()));
-    log.map(2.0, "robot2", &place().draw(&right()));
+    pair(log, &place().draw(&left()), &place().draw(&right()));
 }

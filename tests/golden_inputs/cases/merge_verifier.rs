@@ -1,8 +1,8 @@
 //! Inputs of `merge_verifier`: maps of two robots, and hypotheses of their relative pose.
 
-use super::Case;
 use super::drawing::{FloorPlan, View};
 use super::icp_refiner::{CELL, left, maps, off, right, truth};
+use super::{Case, pair};
 use gridweave_runtime::ros::Alignment;
 use gridweave_stages::shared::geometry::{Pose2, pose};
 use gridweave_tests::{LogBuilder, TestMap, header};
@@ -37,8 +37,7 @@ pub(super) fn cases() -> Vec<Case> {
             by_maps(log, 4.0, &[truth()]);
         }),
         case("another_building", |log| {
-            log.map(1.0, "robot1", &FloorPlan::office().draw(&left()));
-            log.map(2.0, "robot2", &FloorPlan::another_office().draw(&right()));
+            pair(log, &FloorPlan::office().draw(&left()), &FloorPlan::another_office().draw(&right()));
             propose(log, 3.0, &by_tags(&truth()));
         }),
         case("stretched_map", |log| {
@@ -52,8 +51,7 @@ pub(super) fn cases() -> Vec<Case> {
         case("mirrored", |log| {
             let mut mirrored = FloorPlan::office();
             mirrored.walls.iter_mut().for_each(|wall| (wall[1], wall[3]) = (10.0 - wall[1], 10.0 - wall[3]));
-            log.map(1.0, "robot1", &FloorPlan::office().draw(&left()));
-            log.map(2.0, "robot2", &mirrored.draw(&right()));
+            pair(log, &FloorPlan::office().draw(&left()), &mirrored.draw(&right()));
             propose(log, 3.0, &by_tags(&truth()));
         }),
         case("no_overlap", |log| {
@@ -63,13 +61,11 @@ pub(super) fn cases() -> Vec<Case> {
             propose(log, 3.0, &by_tags(&truth()));
         }),
         case("all_occupied", |log| {
-            log.map(1.0, "robot1", &TestMap::filled(160, 140, CELL, 100));
-            log.map(2.0, "robot2", &TestMap::filled(160, 140, CELL, 100));
+            pair(log, &TestMap::filled(160, 140, CELL, 100), &TestMap::filled(160, 140, CELL, 100));
             propose(log, 3.0, &by_tags(&pose(0.0, 0.0, 0.0)));
         }),
         case("empty_map", |log| {
-            log.map(1.0, "robot1", &FloorPlan::office().draw(&left()));
-            log.map(2.0, "robot2", &TestMap::filled(100, 80, CELL, -1));
+            pair(log, &FloorPlan::office().draw(&left()), &TestMap::filled(100, 80, CELL, -1));
             propose(log, 3.0, &by_tags(&truth()));
             log.map(4.0, "robot2", &TestMap::filled(0, 0, CELL, 0));
         }),
@@ -110,8 +106,7 @@ const TOPIC: &str = "/icp/alignment";
 
 /// Both robots have seen all of a building of 14 x 10 m.
 fn whole_maps(log: &mut LogBuilder, plan: &FloorPlan) {
-    log.map(1.0, "robot1", &plan.draw(&View { high: [14.2, 10.2], ..left() }));
-    log.map(2.0, "robot2", &plan.draw(&View { low: [-0.2, -0.2], ..right() }));
+    pair(log, &plan.draw(&View { high: [14.2, 10.2], ..left() }), &plan.draw(&View { low: [-0.2, -0.2], ..right() }));
 }
 
 /// A hall with two alcoves, which looks the same after half a turn.

@@ -25,7 +25,7 @@ mod tag_filter;
 mod tag_localizer;
 mod topology;
 
-use gridweave_tests::LogBuilder;
+use gridweave_tests::{LogBuilder, TestMap};
 use std::fs;
 use std::path::Path;
 
@@ -50,6 +50,12 @@ impl Case {
         (self.write)(&mut log);
         log.finish();
     }
+}
+
+/// The map of each of two robots.
+fn pair(log: &mut LogBuilder, of_robot1: &TestMap, of_robot2: &TestMap) {
+    log.map(1.0, "robot1", of_robot1);
+    log.map(2.0, "robot2", of_robot2);
 }
 
 /// All cases whose inputs are made up.

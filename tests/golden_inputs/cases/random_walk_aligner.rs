@@ -1,8 +1,8 @@
 //! Inputs of `random_walk_aligner`: maps of two robots.
 
-use super::Case;
 use super::drawing::{FloorPlan, View};
 use super::map_aligner::{left, place, right};
+use super::{Case, pair};
 use gridweave_stages::shared::geometry::UNKNOWN;
 use gridweave_tests::TestMap;
 
@@ -13,13 +13,7 @@ pub(super) fn cases() -> Vec<Case> {
             log.map(1.0, "robot1", &place().draw(&View { high: [14.2, 10.2], ..left() }));
             log.map(2.0, "robot2", &place().draw(&View { low: [-0.2, -0.2], grid_yaw: 0.5, ..right() }));
         }),
-        case("another_building", |log| {
-            log.map(1.0, "robot1", &place().draw(&left()));
-            log.map(2.0, "robot2", &FloorPlan::another_office().draw(&right()));
-        }),
-        case("empty_map", |log| {
-            log.map(1.0, "robot1", &place().draw(&left()));
-            log.map(2.0, "robot2", &TestMap::filled(100, 80, 0.1, UNKNOWN));
-        }),
+        case("another_building", |log| pair(log, &place().draw(&left()), &FloorPlan::another_office().draw(&right()))),
+        case("empty_map", |log| pair(log, &place().draw(&left()), &TestMap::filled(100, 80, 0.1, UNKNOWN))),
     ]
 }
