@@ -317,7 +317,8 @@ fn lost_way(name: &str, seconds: f64, cause: LossCause) -> String {
             format!("nothing shows how it moved in the {pause:.1} s before, and its scans lie on no earlier ones")
         }
         LossCause::ParallelWalls => {
-            "it has no odometry, and its scans do not show how it moved along walls that are bare and parallel".to_owned()
+            "it has no odometry, and its scans do not show how it moved along walls that are bare and parallel"
+                .to_owned()
         }
     };
     format!(

@@ -1,0 +1,172 @@
+"""Makes a log with the scans of a robot that drives 75 m along a closed corridor of 90 by 2.2 m, and its true poses:
+
+    python logs/benches/corridor_scans.py OUT.mcap --range 8 --doors --odometry
+
+Scans come 10 times a second at 0.6 m/s, with 1 cm of noise, on `/robot1/scan`, and the truth on `/robot1/truth`. Odometry, on `/robot1/odom`,
+is off by 5 % of the way (standard deviation of each step) and 3 % of the turn. It needs numpy and mcap-ros2-support of PyPI.
+"""
+
+import argparse
+
+import numpy as np
+from mcap_ros2.writer import Writer
+
+HALF_WIDTH, START, END = 1.1, -5.0, 85.0
+DOOR_DEPTH, DOOR_WIDTH = 0.12, 0.9
+WAY, SPEED, RATE = 75.0, 0.6, 10.0
+NOISE, WAY_NOISE, TURN_NOISE = 0.01, 0.05, 0.03
+SEPARATOR = "=" * 80
+HEADER = f"""{SEPARATOR}
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+{SEPARATOR}
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+SCAN = f"""std_msgs/Header header
+float32 angle_min
+float32 angle_max
+float32 angle_increment
+float32 time_increment
+float32 scan_time
+float32 range_min
+float32 range_max
+float32[] ranges
+float32[] intensities
+{HEADER}"""
+POSE = f"""{SEPARATOR}
+MSG: geometry_msgs/Pose
+geometry_msgs/Point position
+geometry_msgs/Quaternion orientation
+{SEPARATOR}
+MSG: geometry_msgs/Point
+float64 x
+float64 y
+float64 z
+{SEPARATOR}
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+"""
+POSE_STAMPED = f"""std_msgs/Header header
+geometry_msgs/Pose pose
+{HEADER}{POSE}"""
+ODOMETRY = f"""std_msgs/Header header
+string child_frame_id
+geometry_msgs/PoseWithCovariance pose
+geometry_msgs/TwistWithCovariance twist
+{HEADER}{POSE}{SEPARATOR}
+MSG: geometry_msgs/PoseWithCovariance
+geometry_msgs/Pose pose
+float64[36] covariance
+{SEPARATOR}
+MSG: geometry_msgs/TwistWithCovariance
+geometry_msgs/Twist twist
+float64[36] covariance
+{SEPARATOR}
+MSG: geometry_msgs/Twist
+geometry_msgs/Vector3 linear
+geometry_msgs/Vector3 angular
+{SEPARATOR}
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+"""
+
+
+def walls(has_doors, random):
+    """The walls as segments: x and y of both ends."""
+    lines = [[(x, -HALF_WIDTH), (x, HALF_WIDTH)] for x in (START, END)]
+    for side in (-1, 1):
+        wall = side * HALF_WIDTH
+        line, x = [(START, wall)], START
+        while has_doors and (x := x + random.uniform(2.5, 8)) + 1 < END:
+            back = wall + side * DOOR_DEPTH
+            line += [(x, wall), (x, back), (x + DOOR_WIDTH, back), (x + DOOR_WIDTH, wall)]
+            x += DOOR_WIDTH
+        lines.append(line + [(END, wall)])
+    return np.array([(*a, *b) for line in lines for a, b in zip(line, line[1:])])
+
+
+def cast(segments, place, angles):
+    """The distance to the nearest wall in each direction."""
+    x, y = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    from_x, from_y, to_x, to_y = segments.T
+    along_x, along_y, off_x, off_y = to_x - from_x, to_y - from_y, from_x - place[0], from_y - place[1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scale = x * along_y - y * along_x
+        distance, share = (off_x * along_y - off_y * along_x) / scale, (off_x * y - off_y * x) / scale
+    return np.where((distance > 0) & (share >= 0) & (share <= 1), distance, np.inf).min(1)
+
+
+def pose_message(x, y, yaw):
+    """The message of a pose in the plane."""
+    orientation = {"x": 0.0, "y": 0.0, "z": np.sin(yaw / 2), "w": np.cos(yaw / 2)}
+    return {"position": {"x": x, "y": y, "z": 0.0}, "orientation": orientation}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("output")
+    parser.add_argument("--beams", type=int, default=360)
+    parser.add_argument("--range", type=float, default=30.0, help="longest range of the lidar, metres")
+    parser.add_argument("--doors", action="store_true", help="door frames every few metres on both sides")
+    parser.add_argument("--odometry", action="store_true")
+    arguments = parser.parse_args()
+    random = np.random.default_rng(1)
+    segments = walls(arguments.doors, random)
+    step = 2 * np.pi / arguments.beams
+    angles = -np.pi + step * np.arange(arguments.beams)
+    odometry = np.zeros(3)
+    before = None
+    with open(arguments.output, "wb") as target:
+        writer = Writer(target)
+        scans = writer.register_msgdef("sensor_msgs/msg/LaserScan", SCAN)
+        poses = writer.register_msgdef("geometry_msgs/msg/PoseStamped", POSE_STAMPED)
+        odometries = writer.register_msgdef("nav_msgs/msg/Odometry", ODOMETRY)
+        still = {"linear": {"x": 0.0, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}
+        for number in range(int(WAY / SPEED * RATE)):
+            time = 1_700_000_000 * 10**9 + int(number / RATE * 1e9)
+            stamp = {"sec": time // 10**9, "nanosec": time % 10**9}
+            pose = np.array([number / RATE * SPEED, 0.15 * np.sin(0.05 * number), 0.08 * np.sin(0.05 * number + 1)])
+            if before is not None:
+                moved = pose - before
+                way = np.hypot(*moved[:2]) * (1 + WAY_NOISE * random.standard_normal())
+                heading = np.arctan2(moved[1], moved[0]) - before[2] + odometry[2]
+                odometry += [way * np.cos(heading), way * np.sin(heading), moved[2] * (1 + TURN_NOISE * random.standard_normal())]
+            before = pose
+            message = {"header": {"stamp": stamp, "frame_id": "building"}, "pose": pose_message(*pose)}
+            writer.write_message("/robot1/truth", poses, message, time, time)
+            if arguments.odometry:
+                message = {
+                    "header": {"stamp": stamp, "frame_id": "robot1/odom"},
+                    "child_frame_id": "robot1/base_link",
+                    "pose": {"pose": pose_message(*odometry), "covariance": [0.0] * 36},
+                    "twist": {"twist": still, "covariance": [0.0] * 36},
+                }
+                writer.write_message("/robot1/odom", odometries, message, time, time)
+            ranges = cast(segments, pose, angles + pose[2]) + NOISE * random.standard_normal(arguments.beams)
+            ranges[ranges > arguments.range] = np.inf
+            message = {
+                "header": {"stamp": stamp, "frame_id": "robot1/base_link"},
+                "angle_min": angles[0],
+                "angle_max": angles[-1],
+                "angle_increment": step,
+                "time_increment": 0.0,
+                "scan_time": 1 / RATE,
+                "range_min": 0.05,
+                "range_max": arguments.range,
+                "ranges": ranges.tolist(),
+                "intensities": [],
+            }
+            writer.write_message("/robot1/scan", scans, message, time, time)
+        writer.finish()
+
+
+if __name__ == "__main__":
+    main()
