@@ -12,6 +12,9 @@ const OWN: &str = "map";
 const BODIES: [&str; 3] = ["odom", "base_link", "base_footprint"];
 /// Parts of the names of programs that merge maps.
 const MERGERS: [&str; 4] = ["merg", "fused", "combined", "stitch"];
+/// Words that have such a part and another meaning.
+const OTHER_WORDS: [&str; 2] = ["emerg", "submerg"];
+
 /// Whose map a grid is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum MapOrigin {
@@ -130,7 +133,7 @@ pub(crate) fn doubtful(topic: &str, robot: &str, option: &str) -> String {
 
 /// Whether a name is that of a program that merges maps.
 pub(crate) fn is_merger(name: &str) -> bool {
-    let name = name.to_lowercase();
+    let name = OTHER_WORDS.iter().fold(name.to_lowercase(), |name, word| name.replace(word, ""));
     MERGERS.iter().any(|part| name.contains(part))
 }
 
@@ -235,6 +238,7 @@ mod tests {
     fn a_program_that_merges_maps_is_known_by_its_name() {
         let merging = roles(&["a", "b", "MapMerger"], &[]);
         assert_eq!(MergedMaps::default().origin("MapMerger", "map", &merging), Merged);
+        assert!(!is_merger("Emergency") && !is_merger("submerged2") && is_merger("emergency_merged"));
         let files = roles(&["merged1", "merged2", "merged3"], &[]);
         assert_eq!(MergedMaps::default().origin("merged1", "map", &files), Robot);
     }

@@ -171,7 +171,11 @@ impl ScanMapper {
         robot.draw(&self.parameters, is_end, |outcome| match outcome {
             ScanOutcome::Used => {}
             ScanOutcome::NoPose => {
-                output.warn(format!("scans of {name} were left out: there is no pose of it for their time"))
+                output.warn(format!(
+                    "scans of {name} were left out: there is no pose of it at most {} s before their time. For poses at a lower rate, \
+                     give --set mapper.max_pose_age=SECONDS",
+                    self.parameters.max_pose_age
+                ))
             }
             ScanOutcome::NotMatched => {
                 output.warn(format!(
@@ -312,18 +316,20 @@ fn send_pose(
 }
 
 fn lost_way(name: &str, seconds: f64, cause: LossCause) -> String {
-    let why = match cause {
-        LossCause::Pause(pause) => {
-            format!("nothing shows how it moved in the {pause:.1} s before, and its scans lie on no earlier ones")
-        }
-        LossCause::ParallelWalls => {
+    let (why, cure) = match cause {
+        LossCause::Pause(pause) => (
+            format!("nothing shows how it moved in the {pause:.1} s before, and its scans lie on no earlier ones"),
+            "cut the log there",
+        ),
+        LossCause::ParallelWalls => (
             "it has no odometry, and its scans do not show how it moved along walls that are bare and parallel"
-                .to_owned()
-        }
+                .to_owned(),
+            "record its odometry, or cut the log where it sees more again",
+        ),
     };
     format!(
         "{name} has lost its way {seconds:.1} s after its first scan: {why}. What it saw from there on is left out of its map. To use \
-         it, cut the log there (`gridweave filter` with --end and with --start), and merge both parts as two robots"
+         it, {cure} (`gridweave filter` with --end and with --start), and merge both parts as two robots"
     )
 }
 

@@ -51,18 +51,18 @@ pub fn scan_points(hits: &[Point2], lidar: &Point2) -> Vec<ScanPoint> {
             break;
         }
         kept = Some(*place);
-        let normal = match surface(hits, index, lidar) {
-            Surface::Wall(normal) => Some(normal),
-            Surface::Spot => None,
-            Surface::Grazed => continue,
+        let normal = match kind(hits, index, lidar) {
+            HitKind::Wall(normal) => Some(normal),
+            HitKind::Spot => None,
+            HitKind::Grazed => continue,
         };
         points.push(ScanPoint { place: *place, normal });
     }
     points
 }
 
-/// What a hit lies on.
-enum Surface {
+/// What a hit lies on, as those beside it show.
+enum HitKind {
     /// A wall with this normal.
     Wall(Vector2<f64>),
     /// A corner, clutter, or an object of the width of a beam.
@@ -71,8 +71,8 @@ enum Surface {
     Grazed,
 }
 
-/// The surface at one of the hits.
-fn surface(hits: &[Point2], index: usize, lidar: &Point2) -> Surface {
+/// The kind of one of the hits.
+fn kind(hits: &[Point2], index: usize, lidar: &Point2) -> HitKind {
     let at = hits[index];
     let [before, after] = [index.checked_sub(1).and_then(|before| hits.get(before)), hits.get(index + 1)];
     let beside = |other: Option<&Point2>| other.map_or(f64::INFINITY, |other| (other - at).norm());
@@ -83,20 +83,20 @@ fn surface(hits: &[Point2], index: usize, lidar: &Point2) -> Surface {
     let near = near_before.chain(near_after);
     if near.clone().nth(1).is_some() {
         return match normal(&at, near, lidar) {
-            Some(normal) => Surface::Wall(normal),
-            None => Surface::Spot,
+            Some(normal) => HitKind::Wall(normal),
+            None => HitKind::Spot,
         };
     }
     let range = (at - lidar).norm();
     let is_behind = |other: Option<&Point2>| other.is_some_and(|other| (other - lidar).norm() > range);
     if is_behind(before) && is_behind(after) {
-        return Surface::Spot;
+        return HitKind::Spot;
     }
     match (before, after) {
         (Some(before), Some(after)) if is_between(&at, before, after) => {
-            normal(&at, [before, after].into_iter(), lidar).map_or(Surface::Grazed, Surface::Wall)
+            normal(&at, [before, after].into_iter(), lidar).map_or(HitKind::Grazed, HitKind::Wall)
         }
-        _ => Surface::Grazed,
+        _ => HitKind::Grazed,
     }
 }
 
@@ -145,9 +145,10 @@ mod tests {
 
     #[test]
     fn hits_far_away_are_left_out_and_a_scan_has_a_limited_number_of_points() {
-        let far = [Point2::new(1e7, 0.0), Point2::new(f64::NAN, 0.0), Point2::new(0.0, 41.0), Point2::new(0.0, 39.0)];
-        let points = scan_points(&far, &Point2::origin());
-        assert_eq!(points.iter().map(|point| point.place).collect::<Vec<_>>(), [far[3]]);
+        let too_far = [Point2::new(1e7, 0.0), Point2::new(f64::NAN, 0.0), Point2::new(0.0, 41.0)];
+        let wall = [0.0, 0.1, 0.2].map(|x| Point2::new(x, 39.0));
+        let points = scan_points(&[too_far, wall].concat(), &Point2::origin());
+        assert_eq!(points.iter().map(|point| point.place).collect::<Vec<_>>(), wall);
         // Each hit is apart from the one before, and all are beside each other.
         let many: Vec<Point2> = (0..200_000).map(|hit| Point2::new(0.06 * f64::from(hit % 2), 1.0)).collect();
         assert_eq!(scan_points(&many, &Point2::origin()).len(), MAX_POINTS);
