@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 
 /// The command under test.
 pub(crate) const GRIDWEAVE: &str = env!("CARGO_BIN_EXE_gridweave-ros");
-/// What takes longer hangs.
-const LONGEST: Duration = Duration::from_secs(400);
+/// What takes longer hangs: messages are built for minutes, beside other tests.
+const LONGEST: Duration = Duration::from_secs(900);
 /// So often it is looked whether something has happened.
 const LOOK_INTERVAL: Duration = Duration::from_millis(20);
 
