@@ -139,7 +139,7 @@ pub(crate) fn is_merger(name: &str) -> bool {
 
 /// The name of a frame without that of the robot. Frames have the names of their robots before them, the frame of a
 /// merged map, too.
-fn own<'a>(robot: &str, frame: &'a str) -> &'a str {
+pub(super) fn own<'a>(robot: &str, frame: &'a str) -> &'a str {
     let frame = plain(frame);
     frame.strip_prefix(robot).and_then(|rest| rest.strip_prefix('/')).unwrap_or(frame)
 }

@@ -1,5 +1,6 @@
 //! Messages of several robots on one topic, which their frames alone tell apart.
 
+use super::merged_maps::own;
 use super::scan_topics::is_sensor;
 use std::collections::BTreeMap;
 
@@ -13,7 +14,7 @@ pub(crate) struct MixedFrames(BTreeMap<String, String>);
 impl MixedFrames {
     /// Adds the frame of a message on a topic of `robot`. Returns the problem if another message was another robot's.
     pub(crate) fn add(&mut self, topic: &str, robot: &str, frame: &str) -> Option<String> {
-        let frame = frame.strip_prefix(robot).and_then(|rest| rest.strip_prefix('/')).unwrap_or(frame);
+        let frame = own(robot, frame);
         match self.0.get(topic) {
             Some(first) if first == frame => None,
             Some(first) => problem(topic, [first, frame]),
@@ -26,19 +27,19 @@ impl MixedFrames {
 }
 
 /// The problem of messages on a topic in these frames if two of them are those of two robots.
-pub(crate) fn problem_of_frames<'a>(topic: &str, frames: impl Iterator<Item = &'a String> + Clone) -> Option<String> {
-    let mut pairs = frames.clone().flat_map(|one| frames.clone().map(move |other| [one.as_str(), other.as_str()]));
+pub(crate) fn problem_of_frames<'a>(topic: &str, frames: impl Iterator<Item = &'a String>) -> Option<String> {
+    let robot = topic.split('/').nth(1).unwrap_or_default();
+    let frames: Vec<&str> = frames.map(|frame| own(robot, frame)).collect();
+    let mut pairs = frames.iter().flat_map(|one| frames.iter().map(move |other| [*one, *other]));
     pairs.find_map(|pair| problem(topic, pair))
 }
 
 /// The problem of messages on one topic in two frames: that they are those of two robots, `robot1/laser` and
 /// `robot2/laser`. One robot may have two lidars, `front/laser` and `rear/laser`.
 fn problem(topic: &str, frames: [&str; 2]) -> Option<String> {
-    let parts =
-        |frame: &'_ str| frame.trim_start_matches('/').split_once('/').map(|(a, b)| (a.to_owned(), b.to_owned()));
-    let [(one, of_one), (other, of_other)] = [parts(frames[0])?, parts(frames[1])?];
+    let [(one, of_one), (other, of_other)] = [frames[0].split_once('/')?, frames[1].split_once('/')?];
     let is_part = |name: &str| is_sensor(name) || name.split(['_', '-']).any(|word| PLACES.contains(&word));
-    (one != other && of_one == of_other && !is_part(&one) && !is_part(&other)).then(|| {
+    (one != other && of_one == of_other && !is_part(one) && !is_part(other)).then(|| {
         let name = topic.rsplit('/').next().unwrap_or_default();
         format!(
             "`{topic}` has the messages of several robots, by their frames {} and {}: record those of each robot on a topic of \

@@ -173,12 +173,8 @@ fn mixed_frames(info: &LogInfo) -> impl Iterator<Item = String> {
         let type_name = full_type_name(&topic.type_name);
         is_scan(&type_name) || type_name == Odometry::NAME
     };
-    let own = |topic: &TopicInfo| {
-        let robot = topic.topic.split('/').nth(1).unwrap_or_default();
-        let own = |frame: &String| frame.strip_prefix(&format!("{robot}/")).unwrap_or(frame).to_owned();
-        topic.frames.iter().map(own).collect::<Vec<String>>()
-    };
-    info.topics.iter().filter(is_of_one).filter_map(move |topic| problem_of_frames(&topic.topic, own(topic).iter()))
+    let problem = |topic: &TopicInfo| problem_of_frames(&topic.topic, topic.frames.iter());
+    info.topics.iter().filter(is_of_one).filter_map(problem)
 }
 
 fn joined(topics: &BTreeSet<String>) -> String {
