@@ -68,7 +68,6 @@ impl ScanGrid {
     ///
     /// Beams pass free cells; a cell in which a beam of this scan has hit something is a hit, even if other beams of
     /// the scan pass it.
-    /// same scan.
     pub fn add_scan(&mut self, beams: &[CellBeam]) {
         let mut ends = std::mem::take(&mut self.ends);
         ends.clear();

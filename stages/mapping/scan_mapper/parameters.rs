@@ -67,6 +67,10 @@ pub struct ScanMapperParameters {
     /// turn; after these it is estimated from the scans.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub odometry_deviation: f64,
+    /// Along odometry no map is sent where more than this share of the scans that see walls of other times look through
+    /// them, as where a map is bent or doubled.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub max_contradicting: f64,
 }
 
 impl Default for ScanMapperParameters {
@@ -86,6 +90,7 @@ impl Default for ScanMapperParameters {
             step: 0.2,
             step_yaw: 0.2,
             odometry_deviation: 0.1,
+            max_contradicting: 0.08,
         }
     }
 }

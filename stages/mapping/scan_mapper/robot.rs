@@ -2,8 +2,9 @@
 
 use super::continuous_odometry::ContinuousOdometry;
 use super::scan_odometry::ScanOdometry;
-use super::slam_map::{LossCause, LostScans, LostWay, SlamMap};
+use super::slam_map::{BadScans, LossCause, LostWay, SlamMap};
 use super::{ScanBeams, ScanMap, ScanMapperParameters, TooLarge};
+use crate::mapping::slam::Contradictions;
 use crate::shared::geometry::{Point2, Pose2, pose};
 use crate::shared::robot_clock::RobotClock;
 use crate::shared::scan_grid::SnapshotMap;
@@ -273,9 +274,14 @@ impl Robot {
         self.slam_map().is_some_and(SlamMap::is_mirrored)
     }
 
-    /// Whether its scans lie so seldom on each other that there is no map of them.
-    pub(super) fn lost(&self) -> Option<LostScans> {
-        self.slam_map().and_then(SlamMap::lost)
+    /// How often its scans contradict each other, if its poses are found by SLAM.
+    pub(super) fn contradictions(&self) -> Contradictions {
+        self.slam_map().map(SlamMap::contradictions).unwrap_or_default()
+    }
+
+    /// Whether so many of its scans lie on no others, or contradict others, that there is no map of them.
+    pub(super) fn bad_scans(&self, contradictions: &Contradictions) -> Option<BadScans> {
+        self.slam_map()?.bad_scans(contradictions)
     }
 }
 

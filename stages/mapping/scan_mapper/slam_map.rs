@@ -1,13 +1,13 @@
 //! The map of a robot that has odometry only, or nothing but scans: its poses are found by SLAM.
 
 use super::{BaseBeam, ScanBeams, ScanMap, ScanMapperParameters};
-use crate::mapping::slam::{LocatedScan, ScanPoint, Trajectory, scan_points};
+use crate::mapping::slam::{Contradictions, LocatedScan, ScanPoint, Trajectory, scan_points};
 use crate::shared::geometry::{Point2, Pose2, pose, wrap_angle};
 use gridweave_runtime::message::LogTime;
 
 /// Largest share of the scans that may lie on no others, for a map to be drawn.
 const MAX_UNMATCHED: f64 = 0.2;
-/// Least number of scans before which the share says nothing.
+/// Least number of scans before which a share says nothing.
 const LEAST_SCANS: usize = 20;
 
 /// A scan whose beams were all sent from one pose of the base.
@@ -36,6 +36,7 @@ pub(super) struct SlamMap {
     drawn: usize,
     first_unmatched: Option<LogTime>,
     lost_way: Option<LostWay>,
+    max_contradicting: f64,
 }
 
 /// Where a robot has lost its way: how it moved from there on is not known.
@@ -54,15 +55,25 @@ pub(super) enum LossCause {
     ParallelWalls,
 }
 
-/// Scans that lie on no others.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct LostScans {
+/// So many bad scans that there is no map of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct BadScans {
+    pub(super) fault: ScanFault,
     /// How many.
-    pub(super) unmatched: usize,
+    pub(super) count: usize,
     /// Of how many.
     pub(super) scans: usize,
     /// Time of the first of them.
     pub(super) since: LogTime,
+}
+
+/// What is wrong with scans.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ScanFault {
+    /// They lie on no others.
+    Unmatched,
+    /// Their beams pass through walls that the robot saw at other times.
+    Contradicting,
 }
 
 impl SlamMap {
@@ -74,6 +85,7 @@ impl SlamMap {
             drawn: 0,
             first_unmatched: None,
             lost_way: None,
+            max_contradicting: parameters.max_contradicting,
         }
     }
 
@@ -211,12 +223,28 @@ impl SlamMap {
         self.trajectory.turns_against_odometry()
     }
 
-    /// Whether so many scans lie on no others that there is no map of them.
-    pub(super) fn lost(&self) -> Option<LostScans> {
-        let (unmatched, scans) = (self.trajectory.unmatched(), self.scans.len());
-        let is_lost = scans >= LEAST_SCANS && unmatched as f64 > MAX_UNMATCHED * scans as f64;
-        let since = self.first_unmatched.filter(|_| is_lost)?;
-        Some(LostScans { unmatched, scans, since })
+    /// The scans that contradict the walls that were seen at other times.
+    pub(super) fn contradictions(&self) -> Contradictions {
+        let lidars = self.scans.iter().map(|scan| scan.transform_base_lidar.translation.vector.into());
+        self.trajectory.contradictions(&lidars.collect::<Vec<Point2>>())
+    }
+
+    /// Whether so many scans lie on no others, or contradict others, that there is no map of them.
+    pub(super) fn bad_scans(&self, contradictions: &Contradictions) -> Option<BadScans> {
+        let Contradictions { revisiting, contradicting } = contradictions;
+        let unmatched = self.first_unmatched.map(|since| {
+            let (count, scans) = (self.trajectory.unmatched(), self.scans.len());
+            BadScans { fault: ScanFault::Unmatched, count, scans, since }
+        });
+        let contradicting = contradicting.first().map(|first| {
+            let (count, since) = (contradicting.len(), self.scans[*first].time);
+            BadScans { fault: ScanFault::Contradicting, count, scans: *revisiting, since }
+        });
+        let are_too_many =
+            |bad: &BadScans, most: f64| bad.scans >= LEAST_SCANS && bad.count as f64 > most * bad.scans as f64;
+        unmatched
+            .filter(|bad| are_too_many(bad, MAX_UNMATCHED))
+            .or(contradicting.filter(|bad| are_too_many(bad, self.max_contradicting)))
     }
 }
 

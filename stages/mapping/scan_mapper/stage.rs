@@ -1,7 +1,7 @@
 //! The stage `scan_mapper`.
 
 use super::robot::{Robot, ScanOutcome};
-use super::slam_map::LossCause;
+use super::slam_map::{BadScans, LossCause, ScanFault};
 use super::{MappingMode, ScanBeams, ScanMapperParameters};
 use crate::shared::geometry::Pose2;
 use crate::shared::robot_clock::Leap;
@@ -36,6 +36,10 @@ pub fn kind() -> StageKind {
 const SCANS_OF_A_DRIVE: usize = 50;
 /// Error of the ways of odometry that is worth a warning, as a share.
 const ODOMETRY_ERROR: f64 = 0.05;
+
+/// How to use what a robot saw before and after it lost its way.
+const CUT_THERE: &str =
+    "cut the log there (`gridweave filter` with --end and --start), and merge both parts as two robots";
 
 struct ScanMapper {
     parameters: ScanMapperParameters,
@@ -200,15 +204,13 @@ impl ScanMapper {
             return Ok(());
         }
         robot.sent_until = Some(last);
-        if let Some(lost) = robot.lost() {
-            let reason = format!(
-                "{} of {} scans lie on none of its others, the first of them {:.1} s after its first scan. Its odometry or \
-                 its scans may be wrong",
-                lost.unmatched,
-                lost.scans,
-                lost.since.seconds_since(first)
-            );
-            return send_lost(name, &reason, output);
+        let contradictions = robot.contradictions();
+        if is_end {
+            output.count("scans that see walls again", contradictions.revisiting as u64);
+            output.count("scans that contradict walls", contradictions.contradicting.len() as u64);
+        }
+        if let Some(bad) = robot.bad_scans(&contradictions) {
+            return send_lost(name, &why_bad(&bad, bad.since.seconds_since(first)), output);
         }
         if robot.is_mirrored() {
             return send_lost(name, &upside_down(name), output);
@@ -231,6 +233,22 @@ impl ScanMapper {
             }
         }
         Ok(())
+    }
+}
+
+/// Why a map is not trusted, because of scans of which the first is `since` seconds after the first of all.
+fn why_bad(bad: &BadScans, since: f64) -> String {
+    let BadScans { count, scans, .. } = bad;
+    match bad.fault {
+        ScanFault::Unmatched => format!(
+            "{count} of {scans} scans lie on none of its others, the first of them {since:.1} s after its first scan. Its odometry \
+             or its scans may be wrong"
+        ),
+        ScanFault::Contradicting => format!(
+            "{count} of {scans} scans look through walls that it saw at other times, the first of them {since:.1} s after its first \
+             scan, as where a map is bent or doubled. To use it, record better odometry, or {CUT_THERE}. To see the map, give \
+             --set mapper.max_contradicting=1"
+        ),
     }
 }
 
@@ -267,7 +285,7 @@ fn explain(
         );
         return send_lost(name, &reason, output);
     }
-    if robot.drawn.is_some() && robot.lost().is_none() && robot.map().0.is_none() {
+    if robot.drawn.is_some() && robot.map().0.is_none() && robot.bad_scans(&robot.contradictions()).is_none() {
         let reason = format!("its scans show nothing within {} m", parameters.max_range);
         return send_lost(name, &reason, output);
     }
@@ -319,17 +337,17 @@ fn lost_way(name: &str, seconds: f64, cause: LossCause) -> String {
     let (why, cure) = match cause {
         LossCause::Pause(pause) => (
             format!("nothing shows how it moved in the {pause:.1} s before, and its scans lie on no earlier ones"),
-            "cut the log there",
+            CUT_THERE.to_owned(),
         ),
         LossCause::ParallelWalls => (
             "it has no odometry, and its scans do not show how it moved along walls that are bare and parallel"
                 .to_owned(),
-            "record its odometry, or cut the log where it sees more again",
+            format!("record its odometry, or {CUT_THERE}"),
         ),
     };
     format!(
         "{name} has lost its way {seconds:.1} s after its first scan: {why}. What it saw from there on is left out of its map. To use \
-         it, {cure} (`gridweave filter` with --end and with --start), and merge both parts as two robots"
+         it, {cure}"
     )
 }
 

@@ -375,6 +375,7 @@ fn parameters_that_cannot_be_are_refused() {
         "step = 0",
         "step_yaw = -1",
         "odometry_deviation = nan",
+        "max_contradicting = 1.1",
         "scan = 1",
     ] {
         assert!(StageHarness::new(&kind(), wrong).is_err(), "{wrong}");

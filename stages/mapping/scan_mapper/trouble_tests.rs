@@ -1,6 +1,6 @@
 //! Robots whose odometry, clock or lidar is not as it should be.
 
-use super::test_drive::{BEAMS, CELL, at, cast, scan, still_ranges, truth};
+use super::test_drive::{BEAMS, CELL, LIDAR, WALLS, at, cast, scan, still_ranges, truth};
 use super::tests::{Bench, measure};
 use crate::shared::geometry::{Pose2, pose};
 use gridweave_runtime::message::LogTime;
@@ -10,6 +10,14 @@ use std::f64::consts::TAU;
 /// A scan of one moment.
 fn still(seconds: f64) -> RangeScan {
     RangeScan { time_increment: 0.0, ranges: still_ranges(seconds), ..scan(seconds) }
+}
+
+/// The same in a room two of whose walls are farther away.
+fn still_in_wider_room(seconds: f64) -> RangeScan {
+    let [x, y, yaw] = LIDAR;
+    let (walls, lidar) = ([[-4.0, -3.0, 6.8, 3.8], WALLS[1]], truth(seconds) * pose(x, y, yaw));
+    let angle = |beam: usize| -3.0 + TAU / BEAMS as f64 * beam as f64;
+    RangeScan { ranges: (0..BEAMS).map(|beam| cast(&walls, &lidar, angle(beam)) as f32).collect(), ..still(seconds) }
 }
 
 /// Drives for half a minute, with odometry and scans as they are changed.
@@ -157,4 +165,22 @@ fn a_robot_without_odometry_loses_its_way_where_walls_do_not_show_how_it_moves()
     assert!((9.0..12.0).contains(&lost), "{lost}");
     assert!((last.pose.pose.position.x - 0.5 * lost).abs() < 0.1, "{lost} {:?}", last.pose.pose);
     assert!(warns(&mut bench, "along walls that are bare and parallel"), "{:?}", bench.0.warnings());
+}
+
+#[test]
+fn no_map_is_sent_whose_walls_are_looked_through_unless_it_is_asked_for() {
+    let drive = |parameters: &str| {
+        let mut bench = Bench::new(parameters);
+        for tick in 0..300 {
+            let seconds = 0.1 * f64::from(tick);
+            bench.pose("odometry", "robot1/odom", seconds, truth(seconds));
+            bench.scan(seconds, &if tick < 150 { still(seconds) } else { still_in_wider_room(seconds) });
+        }
+        bench
+    };
+    let mut bench = drive("mode = 'offline'");
+    assert!(bench.map(30.0).0.is_none());
+    let reasons = lost(&mut bench);
+    assert!(reasons.len() == 1 && reasons[0].contains("look through walls that it saw at other times"), "{reasons:?}");
+    assert!(drive("mode = 'offline'\nmax_contradicting = 1.0").map(30.0).0.is_some());
 }

@@ -13,6 +13,7 @@
 //! The noise of odometry is estimated on the way ([`OdometryNoise`]), and is not a parameter to be tuned for each
 //! robot.
 
+mod contradictions;
 mod correlative_search;
 mod likelihood_field;
 mod local_map;
@@ -26,6 +27,7 @@ mod scan_registration;
 mod tests;
 mod trajectory;
 
+pub use contradictions::Contradictions;
 pub use local_map::LocalMap;
 pub use odometry_noise::OdometryNoise;
 pub use pose_graph::{Constraint, PoseGraph};

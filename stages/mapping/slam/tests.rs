@@ -1,5 +1,6 @@
 //! Drives through a building whose walls are known, with odometry that drifts.
 
+use super::contradictions::{PlacedScan, find_contradictions};
 use super::{ScanPoint, Trajectory, scan_points};
 use crate::shared::geometry::{Point2, Pose2, pose};
 use rand::{RngExt, SeedableRng};
@@ -142,4 +143,30 @@ fn what_was_registered_can_be_located_without_adding_it() {
     let off = found.pose.inverse() * truth[3].inv_mul(&at);
     assert!(off.translation.vector.norm() < 0.02 && off.rotation.angle().abs() < 0.01, "{off}");
     assert_eq!(trajectory.poses().len(), 4);
+}
+
+#[test]
+fn scans_contradict_walls_that_were_drawn_elsewhere() {
+    let (walls, truth) = (walls(), drive());
+    let mut random = ChaCha8Rng::seed_from_u64(4);
+    let scans: Vec<Vec<ScanPoint>> = truth.iter().map(|at| scan(&walls, at, &mut random)).collect();
+    // The first corridor is driven along again at the end.
+    let again = truth.len() - 35;
+    let contradictions = |moved: f64| {
+        let mut placed = Vec::new();
+        for (scan, (points, at)) in scans.iter().zip(&truth).enumerate() {
+            let by = if scan < again { 0.0 } else { moved };
+            placed.push(PlacedScan { points, pose: pose(0.0, by, 0.0) * at, lidar: Point2::origin() });
+        }
+        find_contradictions(&placed, 40)
+    };
+    let right = contradictions(0.0);
+    assert!(right.revisiting > 60 && right.contradicting.is_empty(), "{right:?}");
+    assert_eq!(contradictions(0.1).contradicting, [0; 0], "walls are drawn to a few centimetres");
+    let doubled = contradictions(0.6);
+    let is_along_it = |scan: &usize| *scan < 45 || *scan >= again;
+    assert!(doubled.contradicting.len() > 50 && doubled.contradicting.iter().all(is_along_it), "{doubled:?}");
+    let alone = scans.iter().zip(&truth).take(30);
+    let alone = alone.map(|(points, pose)| PlacedScan { points, pose: *pose, lidar: Point2::origin() });
+    assert_eq!(find_contradictions(&alone.collect::<Vec<_>>(), 40).revisiting, 0);
 }

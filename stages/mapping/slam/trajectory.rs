@@ -1,5 +1,6 @@
 //! The poses of a robot at its scans, as they are known so far.
 
+use super::contradictions::{Contradictions, PlacedScan, find_contradictions};
 use super::local_map::LocalMap;
 use super::loop_closure::{Revisit, find_loop_closures};
 use super::odometry_noise::OdometryNoise;
@@ -7,7 +8,7 @@ use super::pose_graph::{Constraint, PoseGraph, turned_information};
 use super::revisits::register_on_revisited;
 use super::scan_points::ScanPoint;
 use super::scan_registration::{WELL_MATCHED, register};
-use crate::shared::geometry::Pose2;
+use crate::shared::geometry::{Point2, Pose2};
 use nalgebra::{Matrix3, UnitComplex, Vector2, Vector3};
 use std::cell::OnceCell;
 use std::ops::Range;
@@ -102,6 +103,14 @@ impl Trajectory {
     /// Length of the ways of the robot as a share of that by odometry.
     pub fn odometry_scale(&self) -> f64 {
         self.noise.scale()
+    }
+
+    /// Compares each scan with the walls that were seen at other times than its own. `lidars` are the positions of the
+    /// lidar at the scans, in the frame of the base.
+    pub fn contradictions(&self, lidars: &[Point2]) -> Contradictions {
+        let scans = self.scans.iter().zip(&self.graph.poses).zip(lidars);
+        let placed = scans.map(|((points, pose), lidar)| PlacedScan { points, pose: *pose, lidar: *lidar });
+        find_contradictions(&placed.collect::<Vec<_>>(), RECENT_SCANS)
     }
 
     /// Adds a scan of a robot that has moved by `moved` since the last one, by odometry. Returns whether a loop
