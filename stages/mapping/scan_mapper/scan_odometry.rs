@@ -5,9 +5,9 @@ use super::{ScanBeams, ScanMapperParameters};
 use crate::shared::geometry::{Pose2, pose};
 use gridweave_runtime::message::LogTime;
 
-/// Standard deviations of the acceleration of a robot, metres and radians per second squared: what the velocity may
-/// change between two scans.
-const ACCELERATION: [f64; 2] = [1.0, 2.0];
+/// Standard deviations of the acceleration of a robot, metres and radians per second squared, by which the motion up to
+/// a scan differs from that up to the one before. Small robots turn out of a curve on the spot between two scans.
+const ACCELERATION: [f64; 2] = [1.0, 5.0];
 /// Least standard deviations of the motion between two scans, metres and radians.
 const LEAST_DEVIATIONS: [f64; 2] = [0.03, 0.02];
 /// Longest time over which a velocity is believed, seconds.
@@ -47,7 +47,7 @@ impl ScanOdometry {
         let gap = time.seconds_since(before).max(0.0);
         let guess = last * self.motion(gap);
         let deviations =
-            [0, 1].map(|axis| LEAST_DEVIATIONS[axis] + 0.5 * ACCELERATION[axis] * gap.min(LONGEST_GAP).powi(2));
+            [0, 1].map(|axis| LEAST_DEVIATIONS[axis] + ACCELERATION[axis] * gap.min(LONGEST_GAP).powi(2));
         let located = slam.locate(&guess, deviations, scan);
         if gap > LONGEST_GAP && !located.is_some_and(|located| located.is_sure) {
             slam.lose_way(time, LossCause::Pause(gap));
