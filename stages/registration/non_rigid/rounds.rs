@@ -6,7 +6,7 @@ use super::contacts::{Contacts, DeformedBody, contacts};
 use super::equations::{Equations, Solution, Unknowns};
 use crate::shared::deformation::Deformation;
 use crate::shared::geometry::Point2;
-use crate::shared::sparse::nested_dissection;
+use crate::shared::sparse::minimum_degree;
 use nalgebra::Vector2;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -153,7 +153,7 @@ fn order(deformed: &[DeformedBody<'_>], is_given: &[bool], walls: &[Contacts]) -
         of_node.sort_unstable();
         of_node.dedup();
     }
-    let places = nested_dissection(&at, &neighbours);
+    let places = minimum_degree(neighbours);
     numbers.into_iter().map(|number| number.map(|number| places[number])).collect()
 }
 
