@@ -24,12 +24,21 @@ pub struct Body<'a> {
 /// The walls of a map with the nodes around them, in its own frame.
 #[derive(Debug)]
 pub(super) struct Shape {
-    /// Sides from which each point of the walls is seen.
-    pub(super) seen: Vec<Sides>,
+    /// Points of the walls.
+    pub(super) points: Vec<WallPoint>,
     /// Nodes of the deformation.
     pub(super) lattice: Lattice,
-    /// For each point of the walls, the nodes around it.
-    pub(super) corners: Vec<Option<Corners>>,
+}
+
+/// A point of a wall, in the map frame.
+#[derive(Debug)]
+pub(super) struct WallPoint {
+    pub(super) at: Point2,
+    pub(super) normal: Vector2<f64>,
+    /// Sides from which it is seen.
+    pub(super) seen: Sides,
+    /// The nodes around it.
+    pub(super) corners: Option<Corners>,
 }
 
 /// Sides from which a wall is seen: that of its normal, and the opposite one.
@@ -46,13 +55,15 @@ impl<'a> Body<'a> {
         let is_seen = |point: &Point2, normal: &Vector2<f64>, side: f64| {
             is_free(grid.value_at(&(point + normal * (side * before))))
         };
-        let points = walls.walls.points().iter().zip(&walls.normals);
-        let seen = points
-            .map(|(point, normal)| Sides { ahead: is_seen(point, normal, 1.0), behind: is_seen(point, normal, -1.0) })
-            .collect();
         let lattice = Lattice::over(grid, spacing);
-        let corners = walls.walls.points().iter().map(|point| lattice.corners(point)).collect();
-        let shape = Arc::new(Shape { seen, lattice, corners });
+        let point = |(at, normal): (&Point2, &Vector2<f64>)| WallPoint {
+            at: *at,
+            normal: *normal,
+            seen: Sides { ahead: is_seen(at, normal, 1.0), behind: is_seen(at, normal, -1.0) },
+            corners: lattice.corners(at),
+        };
+        let points = walls.walls.points().iter().zip(&walls.normals).map(point).collect();
+        let shape = Arc::new(Shape { points, lattice });
         Self { walls, shape, transform_world_map, is_kept: false, known: None }
     }
 

@@ -1,6 +1,6 @@
 //! Correspondences of the walls of two maps, as equations for the nodes around them.
 
-use super::body::Body;
+use super::body::{Body, WallPoint};
 use super::equations::Equations;
 use crate::shared::deformation::{Corners, Deformation, node_jacobian};
 use crate::shared::geometry::{Point2, PointIndex};
@@ -50,19 +50,36 @@ pub(super) struct DeformedBody<'a> {
 impl<'a> DeformedBody<'a> {
     /// A map with a deformation, and the index of its first node among those of all maps.
     pub(super) fn new(body: &'a Body<'a>, deformation: Deformation, first: usize) -> Self {
-        let points = body.walls.walls.points().iter().zip(&body.shape.corners);
-        let in_world = |(point, corners): (&Point2, &Option<Corners>)| match corners {
-            Some(corners) => body.transform_world_map * deformation.apply_at(point, corners),
+        let in_world = |point: &WallPoint| match &point.corners {
+            Some(corners) => body.transform_world_map * deformation.apply_at(&point.at, corners),
             None => Point2::new(f64::NAN, f64::NAN),
         };
-        let points: Vec<Point2> = points.map(in_world).collect();
+        let points: Vec<Point2> = body.shape.points.iter().map(in_world).collect();
         let index = PointIndex::new(&points, body.walls.walls.buckets().side);
         Self { body, deformation, first, points, index }
     }
 
-    /// Position of a node without deformation, world.
-    pub(super) fn node_in_world(&self, node: usize) -> Point2 {
-        self.body.transform_world_map * self.deformation.lattice.position(node)
+    /// The contact of a point of map b with a point of the index of this one; none if they are not the same face of a
+    /// wall.
+    fn contact<'b>(&'b self, partner: usize, b: &'b Self, place: usize) -> Option<Contact<'b>> {
+        let (of_a_world, of_b_world) = (&self.body.transform_world_map, &b.body.transform_world_map);
+        let point = &b.body.shape.points[place];
+        let (points, order) = &self.index;
+        let other = &self.body.shape.points[order[partner]];
+        let normal = of_a_world * other.normal;
+        let cosine = normal.dot(&(of_b_world * point.normal));
+        if !other.seen.fit(point.seen, cosine) {
+            return None;
+        }
+        Some(Contact {
+            of_a: other.corners.as_ref()?,
+            of_b: point.corners.as_ref()?,
+            partner: other.at,
+            normal,
+            point: point.at,
+            residual: normal.dot(&(b.points[place] - points.points()[partner])),
+            target: normal.dot(&(of_a_world * other.at - of_b_world * point.at)),
+        })
     }
 
     /// Deforms it otherwise.
@@ -80,7 +97,7 @@ pub(super) fn contacts(a: &DeformedBody<'_>, b: &DeformedBody<'_>, reach: f64) -
     let mut sums: Vec<Sum> = Vec::new();
     let mut number_of: BTreeMap<[usize; NODES], usize> = BTreeMap::new();
     let mut matched = 0.0;
-    for (point, contact) in found {
+    for contact in found {
         let kernel = (1.0 / (1.0 + (contact.residual / reach).powi(2))).powi(2);
         matched += kernel * length;
         let nodes = contact.nodes(a.first, b.first);
@@ -89,7 +106,7 @@ pub(super) fn contacts(a: &DeformedBody<'_>, b: &DeformedBody<'_>, reach: f64) -
             let information = [Matrix3::zeros(); PAIRS];
             sums.push(Sum { nodes, information, vector: [Vector3::zeros(); NODES] });
         }
-        sums[number].add(&contact.row(a, b, &point), contact.target, weight * kernel);
+        sums[number].add(&contact.row(a, b), contact.target, weight * kernel);
     }
     Contacts { sums, length: matched }
 }
@@ -124,7 +141,7 @@ pub(super) fn apart<'a>(
     reach: f64,
 ) -> (f64, impl Iterator<Item = Apart>) {
     let (length, found) = find_all(a, b, reach);
-    (length, found.map(|(_, contact)| Apart { rigid: contact.target.abs(), deformed: contact.residual.abs() }))
+    (length, found.map(|contact| Apart { rigid: contact.target.abs(), deformed: contact.residual.abs() }))
 }
 
 impl Contacts {
@@ -148,12 +165,14 @@ impl Contacts {
 }
 
 /// A point of map b on a wall of map a.
-struct Contact {
-    of_a: Corners,
-    of_b: Corners,
+struct Contact<'a> {
+    of_a: &'a Corners,
+    of_b: &'a Corners,
     /// Point of the wall of map a, map frame, and its normal, world.
     partner: Point2,
     normal: Vector2<f64>,
+    /// Point of map b, map frame.
+    point: Point2,
     /// Signed distance of the point from the wall with the current deformation, metres.
     residual: f64,
     /// The same without deformation, which the moves of the nodes are to explain.
@@ -165,47 +184,24 @@ fn find_all<'a>(
     a: &'a DeformedBody<'a>,
     b: &'a DeformedBody<'a>,
     reach: f64,
-) -> (f64, impl Iterator<Item = (Point2, Contact)>) {
-    let points = b.body.walls.walls.points();
+) -> (f64, impl Iterator<Item = Contact<'a>>) {
+    let points = &b.body.shape.points;
     let spacing = LEAST_SPACING.max((SPACING_BY_REACH * reach).min(CORRELATION_LENGTH));
     let every = stride(points.len(), MOST_POINTS).max((spacing / b.body.walls.spacing).round() as usize);
+    // All partners first: what is read of them then waits for each other less. That of the point before may be near.
+    let mut partners = Vec::with_capacity(points.len() / every + 1);
     let mut last_partner = usize::MAX;
-    let found = points.iter().enumerate().step_by(every);
-    let found = found.filter_map(move |(index, point)| Some((*point, find(a, b, index, reach, &mut last_partner)?)));
+    for (place, in_world) in b.points.iter().enumerate().step_by(every) {
+        if let Some(nearest) = a.index.0.nearest_from(in_world, reach, last_partner) {
+            last_partner = nearest.index;
+            partners.push((place, last_partner));
+        }
+    }
+    let found = partners.into_iter().filter_map(|(place, partner)| a.contact(partner, b, place));
     (every as f64 * b.body.walls.spacing, found)
 }
 
-/// Partner of a point of the walls of map b within `reach` in map a. The partner of the point before may be near.
-fn find(
-    a: &DeformedBody<'_>,
-    b: &DeformedBody<'_>,
-    index: usize,
-    reach: f64,
-    last_partner: &mut usize,
-) -> Option<Contact> {
-    let (of_a_world, of_b_world) = (&a.body.transform_world_map, &b.body.transform_world_map);
-    let of_b = b.body.shape.corners[index]?;
-    let in_world = b.points[index];
-    let (points, order) = &a.index;
-    *last_partner = points.nearest_from(&in_world, reach, *last_partner)?.index;
-    let partner = order[*last_partner];
-    let normal = of_a_world * a.body.walls.normals[partner];
-    let cosine = normal.dot(&(of_b_world * b.body.walls.normals[index]));
-    if !a.body.shape.seen[partner].fit(b.body.shape.seen[index], cosine) {
-        return None;
-    }
-    let (place, point) = (a.body.walls.walls.points()[partner], b.body.walls.walls.points()[index]);
-    Some(Contact {
-        of_a: a.body.shape.corners[partner]?,
-        of_b,
-        partner: place,
-        normal,
-        residual: normal.dot(&(in_world - a.points[partner])),
-        target: normal.dot(&(of_a_world * place - of_b_world * point)),
-    })
-}
-
-impl Contact {
+impl Contact<'_> {
     /// Indices of its nodes among those of all maps.
     fn nodes(&self, first_a: usize, first_b: usize) -> [usize; NODES] {
         std::array::from_fn(|place| match place < 4 {
@@ -215,7 +211,7 @@ impl Contact {
     }
 
     /// Derivative of the distance of the point from the wall with respect to the move of each node.
-    fn row(&self, a: &DeformedBody<'_>, b: &DeformedBody<'_>, point: &Point2) -> [Vector3<f64>; NODES] {
+    fn row(&self, a: &DeformedBody<'_>, b: &DeformedBody<'_>) -> [Vector3<f64>; NODES] {
         let of_end = |deformed: &DeformedBody<'_>, corners: &Corners, point: &Point2, sign: f64| {
             let normal = deformed.body.transform_world_map.inverse_transform_vector(&self.normal).transpose();
             corners.map(|(node, weight)| {
@@ -224,7 +220,7 @@ impl Contact {
                 (sign * weight * by_node).transpose()
             })
         };
-        let (of_a, of_b) = (of_end(a, &self.of_a, &self.partner, -1.0), of_end(b, &self.of_b, point, 1.0));
+        let (of_a, of_b) = (of_end(a, self.of_a, &self.partner, -1.0), of_end(b, self.of_b, &self.point, 1.0));
         std::array::from_fn(|place| if place < 4 { of_a[place] } else { of_b[place - 4] })
     }
 }

@@ -82,8 +82,8 @@ impl Equations {
     pub(super) fn add(&mut self, one: usize, other: usize, block: &Matrix3<f64>) {
         let unknowns = &*self.unknowns;
         match (unknowns.places[one], unknowns.places[other]) {
-            (Some(row), Some(column)) if row >= column => self.columns[column].push((row, *block)),
-            (Some(column), Some(row)) => self.columns[column].push((row, block.transpose())),
+            (Some(row), Some(column)) if row >= column => add_entry(&mut self.columns[column], row, block),
+            (Some(column), Some(row)) => add_entry(&mut self.columns[column], row, &block.transpose()),
             (Some(row), None) => self.vector[row] -= block * unknowns.given[other],
             (None, Some(row)) => self.vector[row] -= block.tr_mul(&unknowns.given[one]),
             (None, None) => {}
@@ -109,6 +109,14 @@ impl Equations {
     /// Logarithm of the determinant of the matrix. `None` if the equations have no solution.
     pub(super) fn log_determinant(&self) -> Option<f64> {
         Some(factor(&self.columns)?.log_determinant())
+    }
+}
+
+/// Adds a block to that in a row of a column, whose entries are in the order of rows.
+fn add_entry(entries: &mut Vec<(usize, Matrix3<f64>)>, row: usize, block: &Matrix3<f64>) {
+    match entries.binary_search_by_key(&row, |(row, _)| *row) {
+        Ok(place) => entries[place].1 += block,
+        Err(place) => entries.insert(place, (row, *block)),
     }
 }
 

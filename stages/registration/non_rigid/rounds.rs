@@ -123,37 +123,31 @@ impl<'a> Rounds<'a> {
 /// Place of each node in the elimination order. None for those of bodies that are given.
 fn order(deformed: &[DeformedBody<'_>], is_given: &[bool], walls: &[Contacts]) -> Vec<Option<usize>> {
     let mut numbers = Vec::new();
-    let mut at: Vec<Point2> = Vec::new();
+    let mut count = 0;
     for (body, is_given) in deformed.iter().zip(is_given) {
-        for node in 0..body.deformation.lattice.len() {
-            numbers.push((!is_given).then_some(at.len()));
-            if !is_given {
-                at.push(body.node_in_world(node));
-            }
+        for _ in &body.deformation.moves {
+            numbers.push((!is_given).then_some(count));
+            count += usize::from(!is_given);
         }
     }
-    let mut neighbours = vec![Vec::new(); at.len()];
-    let mut connect = |one: usize, other: usize| {
-        if let (Some(one), Some(other)) = (numbers[one], numbers[other])
-            && one != other
-        {
-            neighbours[one].push(other);
-        }
+    // Nodes with a common equation.
+    let edges = deformed
+        .iter()
+        .flat_map(|body| body.deformation.lattice.edges().map(|(i, j)| [body.first + i, body.first + j]));
+    let edges: Vec<[usize; 2]> = edges.collect();
+    let groups =
+        edges.iter().map(|nodes| &nodes[..]).chain(walls.iter().flat_map(Contacts::nodes).map(|nodes| &nodes[..]));
+    let mut groups_of: Vec<Vec<&[usize]>> = vec![Vec::new(); count];
+    for group in groups {
+        group.iter().filter_map(|&node| numbers[node]).for_each(|number| groups_of[number].push(group));
+    }
+    let mut seen_by = vec![usize::MAX; count];
+    let neighbours_of = |(number, groups): (usize, &Vec<&[usize]>)| {
+        seen_by[number] = number;
+        let others = groups.iter().flat_map(|group| *group).filter_map(|&node| numbers[node]);
+        others.filter(|&other| std::mem::replace(&mut seen_by[other], number) != number).collect()
     };
-    for body in deformed {
-        for (i, j) in body.deformation.lattice.edges() {
-            connect(body.first + i, body.first + j);
-            connect(body.first + j, body.first + i);
-        }
-    }
-    for nodes in walls.iter().flat_map(Contacts::nodes) {
-        nodes.iter().for_each(|&one| nodes.iter().for_each(|&other| connect(one, other)));
-    }
-    for of_node in &mut neighbours {
-        of_node.sort_unstable();
-        of_node.dedup();
-    }
-    let places = minimum_degree(neighbours);
+    let places = minimum_degree(groups_of.iter().enumerate().map(neighbours_of).collect());
     numbers.into_iter().map(|number| number.map(|number| places[number])).collect()
 }
 
