@@ -19,7 +19,8 @@ pub fn kind() -> StageKind {
          that is likelier. It sends for each robot a lattice of small displacements and turns with their covariances, and the \
          sharpness of its walls; the rigid frames stay as they are. Deformations are estimated when other robots are placed, when a \
          frame has changed by more than `min_move` or `min_turn` or a map has grown by more than `min_growth`. Where only few maps \
-         are new, these are first aligned with the others. At the end all are estimated from scratch, if that was not done before.",
+         are new, these are first aligned with the others, which stay as they are until more are new. At the end all are estimated \
+         from scratch, if that was not done before.",
         |parameters: ElasticRefinerParameters, _| Ok(ElasticRefiner::new(parameters)),
     )
     .input("map", "The robots' maps.", ElasticRefiner::receive_map)

@@ -34,7 +34,8 @@ pub struct ElasticRefinerParameters {
     /// The same when a frame has turned by more than this, radians.
     #[schemars(range(min = 0.0))]
     pub min_turn: f64,
-    /// The same when the area of a map has grown by more than this share.
+    /// The same when the area of a map has grown by more than this share. The others then stay as they are, and are
+    /// estimated again once the maps that were aligned with them make up more than this share of all.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub min_growth: f64,
 }

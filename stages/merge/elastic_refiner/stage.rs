@@ -38,19 +38,23 @@ pub(super) struct ElasticRefiner {
     frames: RobotFrames,
     /// Frames at the latest refinement.
     deformed_frames: RobotFrames,
-    /// Maps at the latest refinement, by robot.
+    /// Maps of the latest refinement, by robot.
     deformed_maps: BTreeMap<String, DeformedMap>,
+    /// Nodes of the maps that were aligned with the others since all were last estimated together.
+    aligned_alone: usize,
     /// Whether the latest refinement started from that before it.
     started_from_known: bool,
     /// Whether any deformation was sent.
     has_sent: bool,
 }
 
-/// A map at its latest refinement.
+/// A map when its deformation was estimated.
 #[derive(Clone, Debug)]
 struct DeformedMap {
     /// Number of the map among those of its robot.
     number: u64,
+    /// Its frame.
+    frame: RobotFrame,
     /// Number of nodes of its lattice.
     nodes: usize,
     /// Its deformation; none if it was not estimated.
@@ -65,6 +69,7 @@ impl ElasticRefiner {
             frames: RobotFrames::default(),
             deformed_frames: RobotFrames::default(),
             deformed_maps: BTreeMap::new(),
+            aligned_alone: 0,
             started_from_known: false,
             has_sent: false,
         }
@@ -99,23 +104,33 @@ impl ElasticRefiner {
         if is_deformed && !self.started_from_known { Ok(()) } else { self.deform(false, output) }
     }
 
-    /// Whether the robots are near their frames of the latest refinement, and their maps have grown little.
+    /// Whether the robots are near the frames at which they were deformed, and their maps have grown little.
     fn is_near(&self) -> bool {
         let (before, after) = (&self.deformed_frames, &self.frames);
-        let ElasticRefinerParameters { min_move, min_turn, .. } = self.parameters;
-        let mut pairs = before.frames.iter().zip(&after.frames);
+        let has_moved = |frame: &RobotFrame| {
+            self.deformed_maps.get(&frame.robot).is_some_and(|before| !self.is_near_to(&before.frame, frame))
+        };
         before.reference == after.reference
             && before.frames.len() == after.frames.len()
             && self.placed().map(|(robot, _)| robot).eq(self.deformed_maps.keys())
-            && pairs.all(|(one, next)| one.is_near(next, min_move, min_turn))
+            && !after.frames.iter().any(has_moved)
             && self.placed().zip(self.deformed_maps.values()).all(|((_, map), before)| !self.has_grown(before, map))
+    }
+
+    fn is_near_to(&self, before: &RobotFrame, frame: &RobotFrame) -> bool {
+        before.is_near(frame, self.parameters.min_move, self.parameters.min_turn)
     }
 
     /// Whether a map has grown so much since its latest refinement that it is to be refined again.
     fn has_grown(&self, before: &DeformedMap, map: &RobotMap<WallsOnDemand>) -> bool {
-        let ElasticRefinerParameters { min_growth, spacing, .. } = self.parameters;
-        let most = before.nodes as f64 * (1.0 + min_growth);
-        map.number != before.number && Lattice::over(&map.grid(), spacing).len() as f64 > most
+        let most = before.nodes as f64 * (1.0 + self.parameters.min_growth);
+        self.nodes(&before.frame.robot, map) as f64 > most
+    }
+
+    /// Number of nodes of the lattice of a robot's map.
+    fn nodes(&self, robot: &String, map: &RobotMap<WallsOnDemand>) -> usize {
+        let before = self.deformed_maps.get(robot).filter(|before| before.number == map.number);
+        before.map_or_else(|| Lattice::over(&map.grid(), self.parameters.spacing).len(), |before| before.nodes)
     }
 
     /// The maps of the placed robots, by name.
@@ -127,25 +142,29 @@ impl ElasticRefiner {
 
     /// The deformation of a map as it was estimated before, if the map is the same and its frame nearly so.
     fn known(&self, frame: &RobotFrame, map: &RobotMap<WallsOnDemand>) -> Option<Deformation> {
-        let ElasticRefinerParameters { min_move, min_turn, .. } = self.parameters;
-        let before = self.deformed_frames.frames.iter().find(|before| before.robot == frame.robot)?;
-        let deformed = self.deformed_maps.get(&frame.robot).filter(|deformed| deformed.number == map.number)?;
-        let is_near =
-            self.deformed_frames.reference == self.frames.reference && before.is_near(frame, min_move, min_turn);
-        deformed.deformation.clone().filter(|_| is_near)
+        let before = self.deformed_maps.get(&frame.robot).filter(|before| before.number == map.number)?;
+        let is_near = self.deformed_frames.reference == self.frames.reference && self.is_near_to(&before.frame, frame);
+        before.deformation.clone().filter(|_| is_near)
     }
 
-    /// Estimates the deformations of all placed maps; if `from_known`, those of new maps first, if they are few.
+    /// Estimates the deformations of all placed maps; if `from_known`, those of new maps first, if they are few, and
+    /// alone, if they are very few.
     fn deform(&mut self, from_known: bool, output: &Output<Deformations>) -> Result<(), StageError> {
         let frames = self.frames.frames.iter();
         let placed: Vec<_> = frames.filter_map(|frame| Some((frame, self.maps.get(&frame.robot)?))).collect();
         let deformation = self.parameters.deformation();
         let spacing = deformation.spacing;
-        let of_map = |(frame, map): &(&RobotFrame, &RobotMap<WallsOnDemand>)| {
-            let nodes = Lattice::over(&map.grid(), spacing).len();
-            (frame.robot.clone(), DeformedMap { number: map.number, nodes, deformation: None })
-        };
-        let mut deformed_maps: BTreeMap<String, DeformedMap> = placed.iter().map(of_map).collect();
+        let known: Vec<Option<Deformation>> =
+            placed.iter().map(|(frame, map)| self.known(frame, map).filter(|_| from_known)).collect();
+        let (mut deformed_maps, mut all, mut alone) = (BTreeMap::new(), 0, self.aligned_alone);
+        for ((frame, map), known) in placed.iter().zip(&known) {
+            let nodes = self.nodes(&frame.robot, map);
+            all += nodes;
+            alone += if known.is_none() { nodes } else { 0 };
+            let deformed = DeformedMap { number: map.number, frame: (*frame).clone(), nodes, deformation: None };
+            deformed_maps.insert(frame.robot.clone(), deformed);
+        }
+        let are_held = from_known && alone as f64 <= self.parameters.min_growth * all as f64;
         let mut started_from_known = false;
         // A single map is not deformed; that is sent if it was deformed before.
         let has_news = placed.len() > 1 || self.has_sent;
@@ -153,13 +172,15 @@ impl ElasticRefiner {
             self.has_sent = true;
             let bodies: Vec<Body<'_>> = placed
                 .iter()
-                .map(|(frame, map)| {
+                .zip(known)
+                .map(|((frame, map), known)| {
                     let (grid, walls) = (map.grid(), map.walls(NORMAL_RADIUS));
                     let body = Body::new(&grid, walls, frame.transform_reference_robot(), spacing);
                     if self.parameters.keep_reference && frame.robot == self.frames.reference {
                         return body.kept();
                     }
-                    match self.known(frame, map).filter(|_| from_known) {
+                    match known {
+                        Some(known) if are_held => body.held(known),
                         Some(known) => body.deformed(known),
                         None => body,
                     }
@@ -170,14 +191,19 @@ impl ElasticRefiner {
                     started_from_known = refinement.started_from_known;
                     let mut refined = refinement.if_supported();
                     let reference = placed.iter().position(|(frame, _)| frame.robot == self.frames.reference);
+                    // Maps that are held fix what is common to all.
+                    let reference = reference.filter(|_| !refined.iter().any(|map| map.is_held));
                     reference.into_iter().for_each(|reference| anchor(&mut refined, &bodies, reference));
                     let sharpness = sharpness(&bodies, &refined, &deformation);
                     for (((frame, map), refined), sharpness) in placed.iter().zip(&refined).zip(sharpness) {
+                        let Some(deformed) = deformed_maps.get_mut(&frame.robot) else { continue };
+                        if let Some(before) = self.deformed_maps.get(&frame.robot).filter(|_| refined.is_held) {
+                            *deformed = before.clone();
+                            continue;
+                        }
+                        deformed.deformation = Some(refined.deformation.clone());
                         let header = Header::new(output.log_time(), map.frame_id.clone());
                         output.deformation.send(&frame.robot, &message(header, &frame.robot, refined, sharpness))?;
-                        if let Some(deformed) = deformed_maps.get_mut(&frame.robot) {
-                            deformed.deformation = Some(refined.deformation.clone());
-                        }
                     }
                 }
                 None => output.warn(
@@ -186,6 +212,7 @@ impl ElasticRefiner {
             }
         }
         self.started_from_known = started_from_known;
+        self.aligned_alone = if are_held { alone } else { 0 };
         self.deformed_frames = self.frames.clone();
         self.deformed_maps = deformed_maps;
         output.frames.send("", &self.frames)

@@ -39,9 +39,11 @@ fn a_map_that_comes_last_is_aligned_as_if_all_had_come_at_once() {
         frames: names[..count].iter().map(frame).collect(),
         ..Default::default()
     };
-    // One stage gets the last robot after it has deformed the others, one gets all at once.
-    let [late, at_once] = [[3, 4], [4, 4]].map(|counts| {
-        let mut stage = StageHarness::new(&kind(), "").unwrap();
+    // One stage gets the last robot after it has deformed the others, one gets all at once. The last map is a quarter of
+    // all, so one of them estimates all together again, and in another the others stay as they are.
+    let runs = [("min_growth = 0.2", [3, 4]), ("min_growth = 0.3", [3, 4]), ("", [4, 4])];
+    let [together, alone, at_once] = runs.map(|(parameters, counts)| {
+        let mut stage = StageHarness::new(&kind(), parameters).unwrap();
         for (name, cells) in names.iter().zip(&maps) {
             let data: Vec<u8> = cells.iter().map(|cell| *cell as u8).collect();
             let header = Header { frame_id: format!("{name}/map"), ..Default::default() };
@@ -56,14 +58,17 @@ fn a_map_that_comes_last_is_aligned_as_if_all_had_come_at_once() {
         stage.finish(LogTime(3)).unwrap();
         (while_it_runs, stage.take::<MapDeformation>("deformation").unwrap())
     });
-    let (from_known, at_the_end) = late;
-    assert_eq!((from_known.len(), at_the_end.len()), (4, 4), "it starts again at the end");
     assert!(at_once.0.is_empty() && at_once.1.is_empty(), "nothing has changed since");
-    for (one, other) in from_known.iter().zip(&at_the_end) {
-        assert!(one.sharpness.apart < 0.03 && one.sharpness.doubled < 0.03, "{:?}", one.sharpness);
-        let pairs = one.nodes.iter().zip(&other.nodes);
-        let apart = pairs.map(|(one, other)| (one.dx - other.dx).hypot(one.dy - other.dy)).fold(0.0, f64::max);
-        assert!(apart > 0.0 && apart < 0.05, "{}: {apart}", one.robot);
+    // Where the others stay, the last one gives way for them.
+    for ((from_known, at_the_end), sent, most) in [(together, &names[..], 0.05), (alone, &names[3..], 0.1)] {
+        assert!(from_known.iter().map(|message| &message.robot).eq(sent), "{}", from_known.len());
+        assert_eq!(at_the_end.len(), 4, "it starts again at the end");
+        for (one, other) in from_known.iter().rev().zip(at_the_end.iter().rev()) {
+            assert!(one.sharpness.apart < 0.03 && one.sharpness.doubled < 0.03, "{:?}", one.sharpness);
+            let pairs = one.nodes.iter().zip(&other.nodes);
+            let apart = pairs.map(|(one, other)| (one.dx - other.dx).hypot(one.dy - other.dy)).fold(0.0, f64::max);
+            assert!(apart > 0.0 && apart < most, "{}: {apart}", one.robot);
+        }
     }
 }
 

@@ -15,7 +15,7 @@ pub struct Body<'a> {
     pub(super) shape: Arc<Shape>,
     /// `T_world_map`.
     pub(super) transform_world_map: Pose2,
-    /// Whether it is not deformed.
+    /// Whether it is not deformed, or stays deformed as it is known.
     pub(super) is_kept: bool,
     /// Its deformation as it was estimated before.
     pub(super) known: Option<Deformation>,
@@ -85,6 +85,18 @@ impl<'a> Body<'a> {
     pub fn deformed(self, known: Deformation) -> Self {
         let known = Some(known).filter(|known| known.lattice == self.shape.lattice);
         Self { known, ..self }
+    }
+
+    /// The same map, which stays deformed as it was estimated before, while others are aligned with it.
+    #[must_use]
+    pub fn held(self, known: Deformation) -> Self {
+        let body = self.deformed(known);
+        if body.known.is_some() { body.kept() } else { body }
+    }
+
+    /// Whether it stays deformed as it was estimated before.
+    pub(super) fn is_held(&self) -> bool {
+        self.is_kept && self.known.is_some()
     }
 }
 

@@ -24,6 +24,8 @@ pub struct RefinedMap {
     pub cost: f64,
     /// Drift of the map; none if its walls constrain it too little.
     pub drift: Option<Drift>,
+    /// Whether the deformation was known before, and stayed: nothing else is then known of the map.
+    pub is_held: bool,
 }
 
 /// Deformations of all maps.
@@ -34,12 +36,13 @@ pub struct Refinement {
     /// Logarithm of the evidence ratio of deformed to rigid maps. If it is not above 0, `maps` fits the noise of
     /// walls.
     pub gain: f64,
-    /// Whether it started from the deformations of most maps that were known before.
+    /// Whether it depends on deformations that were known before.
     pub started_from_known: bool,
 }
 
 impl Refinement {
-    /// The deformations if the evidence supports them; else none, with the same covariances.
+    /// The deformations if the evidence supports them; else none, with the same covariances, but for maps that are
+    /// held.
     #[must_use]
     pub fn if_supported(self) -> Vec<RefinedMap> {
         if self.gain > 0.0 { self.maps } else { self.maps.into_iter().map(RefinedMap::undeformed).collect() }
@@ -48,6 +51,9 @@ impl Refinement {
 
 impl RefinedMap {
     fn undeformed(self) -> Self {
+        if self.is_held {
+            return self;
+        }
         let deformation = Deformation::none(self.deformation.lattice);
         Self { deformation, cost: 0.0, drift: None, ..self }
     }
@@ -59,7 +65,7 @@ pub fn refine(bodies: &[Body<'_>], parameters: &DeformationParameters) -> Option
     let Estimate { bodies: deformed, started_from_known, last } = estimate(bodies, parameters)?;
     let gain = gain(bodies, &last, parameters)?;
     let covariances = last.solution.covariances();
-    let refined = |(body, wall_matched): (DeformedBody<'_>, f64)| {
+    let refined = |((body, wall_matched), is_held): ((DeformedBody<'_>, f64), bool)| {
         let DeformedBody { deformation, first, .. } = body;
         RefinedMap {
             covariances: (first..first + deformation.moves.len()).map(|node| covariances.of(node, node)).collect(),
@@ -67,9 +73,11 @@ pub fn refine(bodies: &[Body<'_>], parameters: &DeformationParameters) -> Option
             drift: drift(&deformation, first, &covariances, parameters),
             deformation,
             wall_matched,
+            is_held,
         }
     };
-    let maps = deformed.into_iter().zip(last.matched).map(refined).collect();
+    let is_held = bodies.iter().map(Body::is_held);
+    let maps = deformed.into_iter().zip(last.matched).zip(is_held).map(refined).collect();
     Some(Refinement { maps, gain, started_from_known })
 }
 

@@ -20,7 +20,7 @@ const LAST_ROUNDS: usize = 2;
 /// Result of the last round.
 pub(super) struct Estimate<'a> {
     pub(super) bodies: Vec<DeformedBody<'a>>,
-    /// Whether it started from the deformations of most maps that were known before.
+    /// Whether it depends on deformations that were known before.
     pub(super) started_from_known: bool,
     pub(super) last: Round,
 }
@@ -44,10 +44,11 @@ pub(super) fn estimate<'a>(bodies: &'a [Body<'a>], parameters: &DeformationParam
     let nodes = |is_counted: fn(&Body<'_>) -> bool| -> usize {
         bodies.iter().filter(|body| is_counted(body)).map(|body| body.shape.lattice.len()).sum()
     };
-    let started_from_known = nodes(|body| body.known.is_some()) > nodes(|body| body.known.is_none() && !body.is_kept);
+    let started_from_known =
+        nodes(|body| body.known.is_some() && !body.is_kept) > nodes(|body| body.known.is_none() && !body.is_kept);
     let mut first = 0;
     let deformed = bodies.iter().map(|body| {
-        let known = body.known.clone().filter(|_| started_from_known);
+        let known = body.known.clone().filter(|_| started_from_known || body.is_kept);
         let deformation = known.unwrap_or_else(|| Deformation::none(body.shape.lattice.clone()));
         first += deformation.moves.len();
         DeformedBody::new(body, deformation, first - body.shape.lattice.len())
@@ -68,6 +69,7 @@ pub(super) fn estimate<'a>(bodies: &'a [Body<'a>], parameters: &DeformationParam
     for share in shares {
         last = Some(rounds.round(&mut deformed, &is_kept, *share)?);
     }
+    let started_from_known = started_from_known || bodies.iter().any(Body::is_held);
     Some(Estimate { bodies: deformed, started_from_known, last: last? })
 }
 

@@ -31,13 +31,14 @@ impl Sum {
     }
 }
 
-/// For each body, the sharpness of the walls that other maps have as well: with rigid maps, and with deformation.
+/// For each body, the sharpness of the walls that other maps have as well: with rigid maps, and with deformation. Zeros
+/// for those that are held.
 pub fn sharpness(bodies: &[Body<'_>], maps: &[RefinedMap], parameters: &DeformationParameters) -> Vec<[Sharpness; 2]> {
     let deformed = bodies.iter().zip(maps).map(|(body, map)| DeformedBody::new(body, map.deformation.clone(), 0));
     let deformed: Vec<DeformedBody<'_>> = deformed.collect();
     let of_body = |b: usize| {
         let (mut rigid, mut as_deformed) = (Sum::default(), Sum::default());
-        for a in (0..bodies.len()).filter(|a| *a != b) {
+        for a in (0..bodies.len()).filter(|a| *a != b && !maps[b].is_held) {
             let (length, found) = apart(&deformed[a], &deformed[b], SAME_WALL.min(parameters.reach));
             for at in found {
                 rigid.add(length, at.rigid);

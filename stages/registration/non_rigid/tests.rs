@@ -55,6 +55,7 @@ fn a_deformed_map_is_aligned_with_a_straight_one() {
         let rigid: Vec<RefinedMap> = bodies
             .iter()
             .map(|body| RefinedMap {
+                is_held: false,
                 deformation: Deformation::none(body.shape.lattice.clone()),
                 covariances: Vec::new(),
                 wall_matched: 0.0,
