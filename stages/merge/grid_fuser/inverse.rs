@@ -52,6 +52,8 @@ struct Lookup<'a> {
     grid: Grid<'a>,
     area: &'a KnownArea,
     deformation: Option<&'a Deformation>,
+    /// Bound of the displacement by the deformation, cells.
+    deformed: f64,
     /// Column and row, with fractions, of the centre of output cell (0, 0).
     start: Point2,
     /// Their change by one output column; by one output row it is the same turned by a quarter turn.
@@ -71,6 +73,9 @@ impl<'a> Lookup<'a> {
             grid: map.grid,
             area,
             deformation: map.deformation,
+            deformed: map
+                .deformation
+                .map_or(0.0, |deformation| (deformation.largest_move() / map.grid.geometry.resolution).ceil()),
             start: (transform_grid_output * Point2::new(half, half)) * scale,
             step: transform_grid_output.rotation * Vector2::new(output.resolution, 0.0) * scale,
             columns: (area.columns.0 as f64, area.columns.1 as f64),
@@ -82,12 +87,16 @@ impl<'a> Lookup<'a> {
     fn row(&self, row: usize, count: usize) -> LookupRow<'_> {
         let row = row as f64;
         let start = Point2::new(self.start.x - row * self.step.y, self.start.y + row * self.step.x);
-        let resolution = self.grid.geometry.resolution;
-        let deformed = self.deformation.map_or(0.0, |deformation| (deformation.largest_move() / resolution).ceil());
-        let widened = |(low, high): (f64, f64)| (low - deformed, high + deformed);
+        let widened = |(low, high): (f64, f64)| (low - self.deformed, high + self.deformed);
         let by_column = range_within(start.x, self.step.x, widened(self.columns), count);
         let by_row = range_within(start.y, self.step.y, widened(self.rows), count);
-        LookupRow { lookup: self, start, from: by_column.0.max(by_row.0), to: by_column.1.min(by_row.1) }
+        let (from, to) = (by_column.0.max(by_row.0), by_column.1.min(by_row.1));
+        let ends = self.deformation.filter(|_| from < to).map_or_else(Vec::new, |deformation| {
+            let ends = (from / TILE + 1..to.div_ceil(TILE)).map(|stretch| stretch * TILE);
+            let ends = std::iter::once(from).chain(ends).chain([to]);
+            ends.map(|index| self.undeformed(&(start + self.step * index as f64), deformation)).collect()
+        });
+        LookupRow { lookup: self, start, from, to, ends }
     }
 
     /// Inverts the deformation of a point, both in cells.
@@ -115,11 +124,14 @@ struct LookupRow<'a> {
     /// The cells of the row that may be on the known part of the map: the first, and the one after the last.
     from: usize,
     to: usize,
+    /// Positions of its first cell, of those at which further stretches begin, and of the one after the last, if there
+    /// is a deformation: without it.
+    ends: Vec<Point2>,
 }
 
 impl LookupRow<'_> {
-    /// The part of the `count` output cells from `first` on, at most [`TILE`] of them, that may be on known cells of
-    /// the map. `None` if no cell is.
+    /// The part of the `count` output cells from `first` on that may be on known cells of the map: a tile, or what is
+    /// left of the row. `None` if no cell is.
     fn stretch(&self, first: usize, count: usize) -> Option<Stretch<'_>> {
         let (from, to) = (self.from.max(first), self.to.min(first + count));
         if from >= to {
@@ -127,13 +139,14 @@ impl LookupRow<'_> {
         }
         let (mut start, mut step, mut deformation) = (self.start, self.lookup.step, None);
         if let Some(deformed) = self.lookup.deformation {
-            let ends = [from, to].map(|index| start + step * index as f64);
-            let length = (ends[1] - ends[0]).norm() * self.lookup.grid.geometry.resolution;
+            let [one, other] = [from, to].map(|index| start + step * index as f64);
+            let length = (other - one).norm() * self.lookup.grid.geometry.resolution;
             // The deformation may change within a long stretch.
             if length > LONGEST_STRAIGHT * deformed.lattice.spacing() {
                 deformation = Some(deformed);
             } else {
-                let [one, other] = ends.map(|end| self.lookup.undeformed(&end, deformed));
+                let number = first / TILE - self.from / TILE;
+                let (one, other) = (self.ends[number], self.ends[number + 1]);
                 step = (other - one) / (to - from) as f64;
                 start = one - step * from as f64;
             }
