@@ -126,8 +126,9 @@ impl Lattice {
 
     /// Index of a vertex in the table; none if it is outside.
     fn place(&self, (column, row): Vertex) -> Option<usize> {
-        let column = usize::try_from(i64::from(column) - i64::from(self.first.0)).ok()?;
-        let row = usize::try_from(i64::from(row) - i64::from(self.first.1)).ok()?;
+        // What is before the first becomes larger than all.
+        let (column, row) = (column.wrapping_sub(self.first.0) as u32, row.wrapping_sub(self.first.1) as u32);
+        let (column, row) = (column as usize, row as usize);
         (column < self.columns && row * self.columns < self.nodes.len()).then_some(row * self.columns + column)
     }
 }

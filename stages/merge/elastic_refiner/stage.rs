@@ -2,7 +2,7 @@
 //! changed.
 
 use super::ElasticRefinerParameters;
-use crate::registration::non_rigid::{Body, RefinedMap, anchor, refine, sharpness};
+use crate::registration::non_rigid::{Body, RefinedMap, Shape, anchor, refine, sharpness};
 use crate::shared::deformation::{Deformation, Lattice};
 use crate::shared::geometry::row_by_row;
 use crate::shared::robot_maps::{RobotMap, RobotMaps};
@@ -12,6 +12,7 @@ use gridweave_runtime::ros::{
 };
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Outputs of the stage.
 pub(super) struct Deformations {
@@ -40,6 +41,8 @@ pub(super) struct ElasticRefiner {
     deformed_frames: RobotFrames,
     /// Maps of the latest refinement, by robot.
     deformed_maps: BTreeMap<String, DeformedMap>,
+    /// Shapes of these maps, with their numbers.
+    shapes: BTreeMap<String, (u64, Arc<Shape>)>,
     /// Nodes of the maps that were aligned with the others since all were last estimated together.
     aligned_alone: usize,
     /// Whether the latest refinement started from that before it.
@@ -69,6 +72,7 @@ impl ElasticRefiner {
             frames: RobotFrames::default(),
             deformed_frames: RobotFrames::default(),
             deformed_maps: BTreeMap::new(),
+            shapes: BTreeMap::new(),
             aligned_alone: 0,
             started_from_known: false,
             has_sent: false,
@@ -128,7 +132,7 @@ impl ElasticRefiner {
     }
 
     /// Number of nodes of the lattice of a robot's map.
-    fn nodes(&self, robot: &String, map: &RobotMap<WallsOnDemand>) -> usize {
+    fn nodes(&self, robot: &str, map: &RobotMap<WallsOnDemand>) -> usize {
         let before = self.deformed_maps.get(robot).filter(|before| before.number == map.number);
         before.map_or_else(|| Lattice::over(&map.grid(), self.parameters.spacing).len(), |before| before.nodes)
     }
@@ -170,12 +174,18 @@ impl ElasticRefiner {
         let has_news = placed.len() > 1 || self.has_sent;
         if self.parameters.enabled && has_news {
             self.has_sent = true;
+            let shape = |(frame, map): &(&RobotFrame, &RobotMap<WallsOnDemand>)| {
+                let known = self.shapes.get(&frame.robot).filter(|(number, _)| *number == map.number);
+                let shape = || (map.number, Arc::new(Shape::new(&map.grid(), map.walls(NORMAL_RADIUS), spacing)));
+                (frame.robot.clone(), known.cloned().unwrap_or_else(shape))
+            };
+            self.shapes = placed.iter().map(shape).collect();
             let bodies: Vec<Body<'_>> = placed
                 .iter()
                 .zip(known)
                 .map(|((frame, map), known)| {
-                    let (grid, walls) = (map.grid(), map.walls(NORMAL_RADIUS));
-                    let body = Body::new(&grid, walls, frame.transform_reference_robot(), spacing);
+                    let shape = Arc::clone(&self.shapes[&frame.robot].1);
+                    let body = Body::of(shape, map.walls(NORMAL_RADIUS), frame.transform_reference_robot());
                     if self.parameters.keep_reference && frame.robot == self.frames.reference {
                         return body.kept();
                     }

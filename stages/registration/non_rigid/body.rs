@@ -23,7 +23,7 @@ pub struct Body<'a> {
 
 /// The walls of a map with the nodes around them, in its own frame.
 #[derive(Debug)]
-pub(super) struct Shape {
+pub struct Shape {
     /// Points of the walls.
     pub(super) points: Vec<WallPoint>,
     /// Nodes of the deformation.
@@ -51,19 +51,11 @@ pub(super) struct Sides {
 impl<'a> Body<'a> {
     /// A map with its walls at the pose `transform_world_map`, with nodes every `spacing` metres.
     pub fn new(grid: &Grid<'_>, walls: &'a WallMap, transform_world_map: Pose2, spacing: f64) -> Self {
-        let before = before_wall(grid.geometry.resolution);
-        let is_seen = |point: &Point2, normal: &Vector2<f64>, side: f64| {
-            is_free(grid.value_at(&(point + normal * (side * before))))
-        };
-        let lattice = Lattice::over(grid, spacing);
-        let point = |(at, normal): (&Point2, &Vector2<f64>)| WallPoint {
-            at: *at,
-            normal: *normal,
-            seen: Sides { ahead: is_seen(at, normal, 1.0), behind: is_seen(at, normal, -1.0) },
-            corners: lattice.corners(at),
-        };
-        let points = walls.walls.points().iter().zip(&walls.normals).map(point).collect();
-        let shape = Arc::new(Shape { points, lattice });
+        Self::of(Arc::new(Shape::new(grid, walls, spacing)), walls, transform_world_map)
+    }
+
+    /// A map of known shape, which is that of its walls, at the pose `transform_world_map`.
+    pub fn of(shape: Arc<Shape>, walls: &'a WallMap, transform_world_map: Pose2) -> Self {
         Self { walls, shape, transform_world_map, is_kept: false, known: None }
     }
 
@@ -97,6 +89,25 @@ impl<'a> Body<'a> {
     /// Whether it stays deformed as it was estimated before.
     pub(super) fn is_held(&self) -> bool {
         self.is_kept && self.known.is_some()
+    }
+}
+
+impl Shape {
+    /// The walls of a map, with nodes every `spacing` metres.
+    pub fn new(grid: &Grid<'_>, walls: &WallMap, spacing: f64) -> Self {
+        let before = before_wall(grid.geometry.resolution);
+        let is_seen = |point: &Point2, normal: &Vector2<f64>, side: f64| {
+            is_free(grid.value_at(&(point + normal * (side * before))))
+        };
+        let lattice = Lattice::over(grid, spacing);
+        let point = |(at, normal): (&Point2, &Vector2<f64>)| WallPoint {
+            at: *at,
+            normal: *normal,
+            seen: Sides { ahead: is_seen(at, normal, 1.0), behind: is_seen(at, normal, -1.0) },
+            corners: lattice.corners(at),
+        };
+        let points = walls.walls.points().iter().zip(&walls.normals).map(point).collect();
+        Self { points, lattice }
     }
 }
 

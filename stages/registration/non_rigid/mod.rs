@@ -36,7 +36,7 @@ mod sharpness;
 mod tests;
 
 pub use anchor::anchor;
-pub use body::Body;
+pub use body::{Body, Shape};
 pub use drift::Drift;
 pub use parameters::DeformationParameters;
 pub use refine::{RefinedMap, Refinement, deform_onto, refine};

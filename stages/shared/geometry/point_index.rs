@@ -151,7 +151,8 @@ impl PointIndex {
         if self.points.is_empty() || !inside {
             return best.found();
         }
-        let clamp = |value: f64, count: usize| (value.max(0.0) as usize).min(count - 1);
+        // There are fewer than 2^32 columns or rows, and a cast to 32 bits takes a fraction of the time.
+        let clamp = |value: f64, count: usize| (value.max(0.0) as u32 as usize).min(count - 1);
         let (first_row, last_row) = (clamp(local.y - reach, rows), clamp(local.y + reach, rows));
         let home = clamp(local.y, rows);
         // Row of buckets by row, from the point's own outwards: what is found first narrows what follows.

@@ -13,7 +13,7 @@ const ELIMINATED: usize = usize::MAX;
 pub(crate) fn minimum_degree(neighbours: Vec<Vec<usize>>) -> Vec<usize> {
     let count = neighbours.len();
     let mut elimination = Elimination::new(neighbours);
-    while let Some(node) = elimination.next() {
+    while let Some(node) = elimination.next_node() {
         elimination.eliminate(node);
     }
     places(&elimination.steps, count)
@@ -67,7 +67,7 @@ impl Elimination {
     }
 
     /// A node with the fewest neighbours. None if all are eliminated.
-    fn next(&mut self) -> Option<usize> {
+    fn next_node(&mut self) -> Option<usize> {
         while let Some(waiting) = self.waiting.get_mut(self.least) {
             match waiting.pop() {
                 Some(node) if self.degrees[node] == self.least => return Some(node),
