@@ -1,5 +1,6 @@
 //! Score of every translation of one map on another, at one rotation and at the opposite one.
 
+use super::best_blocks::{BestBlocks, Block};
 use super::fourier::{Buffers, Fourier};
 use super::known_cells::KnownCells;
 use super::raster::Content;
@@ -96,32 +97,23 @@ impl Correlator {
     /// on, if its score is above zero; of these the best `most`, the best first.
     pub fn best_of_blocks(&self, workspace: &Workspace, side: f64, most: usize) -> [Vec<ScoredShift>; 2] {
         let side = ((side / self.cell).round() as usize).max(1);
-        let [forth, opposite] = self.blocks(&workspace.buffers.plane, side);
+        let [forth, opposite] = self.blocks(&workspace.buffers.plane, side, most);
         [
-            self.best_shifts(workspace, false, side, most, forth, |score| score.re),
-            self.best_shifts(workspace, true, side, most, opposite, |score| score.im),
+            self.best_shifts(workspace, false, side, forth.sorted(), |score| score.re),
+            self.best_shifts(workspace, true, side, opposite.sorted(), |score| score.im),
         ]
     }
 
-    /// The best translations of the best `most` blocks of `side` cells.
+    /// The best translations of some blocks of `side` cells.
     fn best_shifts(
         &self,
         workspace: &Workspace,
         opposite: bool,
         side: usize,
-        most: usize,
-        mut best: Vec<Block>,
+        blocks: Vec<Block>,
         score: impl Fn(&Complex32) -> f32,
     ) -> Vec<ScoredShift> {
         let plane = &workspace.buffers.plane;
-        // Of equals the first comes first, so that the order does not depend on the sort.
-        let order =
-            |one: &Block, other: &Block| (other.score, one.row, one.column).cmp(&(one.score, other.row, other.column));
-        if best.len() > most {
-            best.select_nth_unstable_by(most, order);
-            best.truncate(most);
-        }
-        best.sort_unstable_by(order);
         let shift = |block: Block| {
             let (width, height) = (self.fourier.width, self.fourier.height);
             let columns = || block.column..(block.column + side).min(width);
@@ -132,14 +124,15 @@ impl Correlator {
                 score: f64::from(block.score),
             })
         };
-        best.into_iter().filter_map(shift).collect()
+        blocks.into_iter().filter_map(shift).collect()
     }
 
-    /// The blocks whose best score is above zero: of the real, and of the imaginary part of a plane.
-    fn blocks(&self, plane: &[Complex32], side: usize) -> [Vec<Block>; 2] {
+    /// The best `most` blocks whose best score is above zero: of the real, and of the imaginary part of a plane.
+    fn blocks(&self, plane: &[Complex32], side: usize, most: usize) -> [BestBlocks; 2] {
         let width = self.fourier.width;
         let zero = Complex32::new(0.0, 0.0);
-        let (mut forth, mut opposite, mut best_of_columns) = (Vec::new(), Vec::new(), vec![zero; width]);
+        let (mut forth, mut opposite) = (BestBlocks::new(most), BestBlocks::new(most));
+        let mut best_of_columns = vec![zero; width];
         for (number, rows) in plane.chunks(side * width).enumerate() {
             best_of_columns.fill(zero);
             for row in rows.chunks_exact(width) {
@@ -148,8 +141,8 @@ impl Correlator {
             for (place, columns) in best_of_columns.chunks(side).enumerate() {
                 let best = columns.iter().fold(zero, |most, scores| greater(&most, scores));
                 for (blocks, score) in [(&mut forth, rounded(best.re)), (&mut opposite, rounded(best.im))] {
-                    if score > 0 {
-                        blocks.push(Block { score, row: number * side, column: place * side });
+                    if score > blocks.too_little {
+                        blocks.add(Block { score, row: number * side, column: place * side });
                     }
                 }
             }
@@ -172,16 +165,6 @@ impl Correlator {
         };
         self.corner - corner + Vector2::new(x, y) * self.cell
     }
-}
-
-/// A square of the plane of scores.
-struct Block {
-    /// Best score in it.
-    score: i32,
-    /// First row.
-    row: usize,
-    /// First column.
-    column: usize,
 }
 
 /// A score in whole cells.

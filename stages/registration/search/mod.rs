@@ -14,6 +14,7 @@
 //! - [`align_maps`]: all of it.
 
 mod align;
+mod best_blocks;
 mod chance;
 mod coordinate_ascent;
 mod correlation;
