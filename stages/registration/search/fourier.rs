@@ -4,8 +4,8 @@ use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 use std::sync::Arc;
 
-/// Number of rows and columns that are transposed at once, so that they stay in the caches.
-const BLOCK: usize = 16;
+/// Number of rows that are transposed at once: their numbers fill a line of the cache.
+const ROWS: usize = 8;
 
 /// Fourier transform of planes of one size.
 pub(super) struct Fourier {
@@ -72,14 +72,17 @@ impl Fourier {
 
 /// Copies rows of `width` numbers to columns of `height`.
 fn transpose(rows: &[Complex32], width: usize, columns: &mut [Complex32], height: usize) {
-    let row_count = rows.len() / width;
-    for first_row in (0..row_count).step_by(BLOCK) {
-        for first_column in (0..width).step_by(BLOCK) {
-            for column in first_column..(first_column + BLOCK).min(width) {
-                for row in first_row..(first_row + BLOCK).min(row_count) {
-                    columns[column * height + row] = rows[row * width + column];
-                }
+    for (number, rows) in rows.chunks(ROWS * width).enumerate() {
+        let first = number * ROWS;
+        if rows.len() < ROWS * width {
+            for (row, numbers) in (first..).zip(rows.chunks_exact(width)) {
+                columns[row..].iter_mut().step_by(height).zip(numbers).for_each(|(to, from)| *to = *from);
             }
+            continue;
+        }
+        let rows: [&[Complex32]; ROWS] = std::array::from_fn(|row| &rows[row * width..][..width]);
+        for (column, numbers) in columns.chunks_exact_mut(height).enumerate() {
+            numbers[first..first + ROWS].iter_mut().zip(&rows).for_each(|(to, row)| *to = row[column]);
         }
     }
 }
