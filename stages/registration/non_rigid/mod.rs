@@ -12,7 +12,7 @@
 //! - frames: a wide prior keeps the maps near their rigid frames.
 //!
 //! Where most maps were deformed before, the new ones are first aligned with these as they are, and the last rounds
-//! estimate all together.
+//! estimate all together. Maps that are held stay as they were deformed, and only the others are estimated.
 //!
 //! Maps stay rigid where that is likelier than a deformation: where the noise of cells explains the walls as well.
 //!
