@@ -46,8 +46,7 @@ impl ScanOdometry {
         };
         let gap = time.seconds_since(before).max(0.0);
         let guess = last * self.motion(gap);
-        let deviations =
-            [0, 1].map(|axis| LEAST_DEVIATIONS[axis] + ACCELERATION[axis] * gap.min(LONGEST_GAP).powi(2));
+        let deviations = [0, 1].map(|axis| LEAST_DEVIATIONS[axis] + ACCELERATION[axis] * gap.min(LONGEST_GAP).powi(2));
         let located = slam.locate(&guess, deviations, scan);
         if gap > LONGEST_GAP && !located.is_some_and(|located| located.is_sure) {
             slam.lose_way(time, LossCause::Pause(gap));

@@ -23,6 +23,9 @@ const SUBMAP_SCANS: usize = 30;
 /// below which they are registered no more.
 const REFINEMENTS: usize = 8;
 const LEAST_REFINEMENT: f64 = 0.005;
+/// Share of the information of odometry about the yaw that counts where a scan is registered: wheels that turn too far do
+/// so for long, so that steps are not independent, and walls show the yaw nearly everywhere.
+const YAW_SHARE: f64 = 0.2;
 /// Share of its points that must lie on the local map, for a scan to be registered at all.
 const LEAST_MATCHED: f64 = 0.15;
 /// Distance of an earlier submap from the robot, metres, up to which it is part of the local map once a loop closure
@@ -123,7 +126,8 @@ impl Trajectory {
         let moved = &self.noise.corrected(moved);
         let guess = last * moved;
         let by_odometry = self.noise.information(moved);
-        let prior = turned_information(&by_odometry, &last.rotation);
+        let mut prior = turned_information(&by_odometry, &last.rotation);
+        prior.m33 *= YAW_SHARE;
         let found = register(self.local_map(), &points, &guess, &prior, self.noise.deviations(moved));
         let is_matched = found.matched >= LEAST_MATCHED;
         let pose = if is_matched { found.pose } else { guess };
