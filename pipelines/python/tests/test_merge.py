@@ -137,17 +137,18 @@ class MergeTest(unittest.TestCase):
             merge([big, np.roll(big, 100)], resolution=0.05, progress=tire)
 
     def test_an_interrupt_ends_a_merge_and_other_threads_go_on(self):
-        big = np.kron(room(), np.ones((8, 8), np.int8))
+        # Large enough to take far longer than the interrupt takes to come.
+        big = np.kron(room(), np.ones((24, 24), np.int8))
         went_on = threading.Event()
 
         def interrupt():
             went_on.set()
             _thread.interrupt_main()
 
-        timer = threading.Timer(0.2, interrupt)
+        timer = threading.Timer(0.05, interrupt)
         timer.start()
         with self.assertRaises(KeyboardInterrupt):
-            merge([big, np.roll(big, 300), np.rot90(big).copy()], resolution=0.02)
+            merge([big, np.roll(big, 900), np.rot90(big).copy()], resolution=0.02)
         timer.join()
         self.assertTrue(went_on.is_set())
 
