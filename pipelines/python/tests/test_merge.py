@@ -2,6 +2,7 @@
 
 import _thread
 import math
+import signal
 import tempfile
 import threading
 import unittest
@@ -140,6 +141,9 @@ class MergeTest(unittest.TestCase):
         # Large enough to take far longer than the interrupt takes to come.
         big = np.kron(room(), np.ones((24, 24), np.int8))
         went_on = threading.Event()
+        # A test that a shell runs in the background may have been told to ignore interrupts.
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)
+        self.addCleanup(signal.signal, signal.SIGINT, before)
 
         def interrupt():
             went_on.set()

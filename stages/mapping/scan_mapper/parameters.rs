@@ -90,7 +90,7 @@ impl Default for ScanMapperParameters {
             step: 0.2,
             step_yaw: 0.2,
             odometry_deviation: 0.1,
-            max_contradicting: 0.08,
+            max_contradicting: 0.06,
         }
     }
 }
