@@ -67,8 +67,8 @@ pub struct ScanMapperParameters {
     /// turn; after these it is estimated from the scans.
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub odometry_deviation: f64,
-    /// Along odometry no map is sent where more than this share of the scans that see walls of other times look through
-    /// them, as where a map is bent or doubled.
+    /// Along odometry, or by scans alone, no map is sent where more than this share of the scans that see walls of other
+    /// times look through them, as where a map is bent or doubled.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub max_contradicting: f64,
 }

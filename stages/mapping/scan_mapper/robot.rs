@@ -274,14 +274,18 @@ impl Robot {
         self.slam_map().is_some_and(SlamMap::is_mirrored)
     }
 
-    /// How often its scans contradict each other, if its poses are found by SLAM.
-    pub(super) fn contradictions(&self) -> Contradictions {
-        self.slam_map().map(SlamMap::contradictions).unwrap_or_default()
+    /// Tests the map that is built by SLAM, at the end in any case: how often its scans contradict each other.
+    pub(super) fn test_map(&mut self, is_end: bool) -> Option<&Contradictions> {
+        let (Localization::ByOdometry(slam) | Localization::ByScans(slam, _)) = &mut self.localization else {
+            return None;
+        };
+        slam.test(is_end);
+        slam.contradictions()
     }
 
-    /// Whether so many of its scans lie on no others, or contradict others, that there is no map of them.
-    pub(super) fn bad_scans(&self, contradictions: &Contradictions) -> Option<BadScans> {
-        self.slam_map()?.bad_scans(contradictions)
+    /// Whether so many of its scans lie on no others, or by the last test contradict others, that there is no map of them.
+    pub(super) fn bad_scans(&self) -> Option<BadScans> {
+        self.slam_map()?.bad_scans()
     }
 }
 

@@ -7,6 +7,9 @@ use gridweave_runtime::message::LogTime;
 
 /// Largest share of the scans that may lie on no others, for a map to be drawn.
 const MAX_UNMATCHED: f64 = 0.2;
+/// How many times as many scans there are when a growing map is tested again: all of its scans are looked at each time, and
+/// a long drive must not cost more and more.
+const TESTED_AGAIN: f64 = 1.1;
 /// Least number of scans before which a share says nothing.
 const LEAST_SCANS: usize = 20;
 
@@ -37,6 +40,8 @@ pub(super) struct SlamMap {
     first_unmatched: Option<LogTime>,
     lost_way: Option<LostWay>,
     max_contradicting: f64,
+    /// The last test of the map, and of how many scans it was.
+    tested: Option<(usize, Contradictions)>,
 }
 
 /// Where a robot has lost its way: how it moved from there on is not known.
@@ -86,6 +91,7 @@ impl SlamMap {
             first_unmatched: None,
             lost_way: None,
             max_contradicting: parameters.max_contradicting,
+            tested: None,
         }
     }
 
@@ -159,6 +165,7 @@ impl SlamMap {
     fn forget_map(&mut self) {
         self.map.clear();
         self.drawn = 0;
+        self.tested = None;
     }
 
     /// Pose of a scan in the map, whose frame is that of odometry at the first scan.
@@ -223,22 +230,34 @@ impl SlamMap {
         self.trajectory.turns_against_odometry()
     }
 
-    /// The scans that contradict the walls that were seen at other times.
-    pub(super) fn contradictions(&self) -> Contradictions {
-        let lidars = self.scans.iter().map(|scan| scan.transform_base_lidar.translation.vector.into());
-        self.trajectory.contradictions(&lidars.collect::<Vec<Point2>>())
+    /// Looks for scans that contradict the walls that were seen at other times, if the map has changed much since the
+    /// last test, or at all and `is_end`.
+    pub(super) fn test(&mut self, is_end: bool) {
+        let count = self.scans.len();
+        let is_tested = |(tested, _): &(usize, Contradictions)| {
+            count == *tested || !is_end && (count as f64) < TESTED_AGAIN * *tested as f64
+        };
+        if !self.tested.as_ref().is_some_and(is_tested) {
+            let lidars = self.scans.iter().map(|scan| scan.transform_base_lidar.translation.vector.into());
+            let found = self.trajectory.contradictions(&lidars.collect::<Vec<Point2>>());
+            self.tested = Some((count, found));
+        }
     }
 
-    /// Whether so many scans lie on no others, or contradict others, that there is no map of them.
-    pub(super) fn bad_scans(&self, contradictions: &Contradictions) -> Option<BadScans> {
-        let Contradictions { revisiting, contradicting } = contradictions;
+    /// What the last test has found.
+    pub(super) fn contradictions(&self) -> Option<&Contradictions> {
+        self.tested.as_ref().map(|(_, found)| found)
+    }
+
+    /// Whether so many scans lie on no others, or by the last test contradict others, that there is no map of them.
+    pub(super) fn bad_scans(&self) -> Option<BadScans> {
         let unmatched = self.first_unmatched.map(|since| {
             let (count, scans) = (self.trajectory.unmatched(), self.scans.len());
             BadScans { fault: ScanFault::Unmatched, count, scans, since }
         });
-        let contradicting = contradicting.first().map(|first| {
-            let (count, since) = (contradicting.len(), self.scans[*first].time);
-            BadScans { fault: ScanFault::Contradicting, count, scans: *revisiting, since }
+        let contradicting = self.contradictions().and_then(|Contradictions { revisiting, contradicting }| {
+            let (count, since) = (contradicting.len(), self.scans.get(*contradicting.first()?)?.time);
+            Some(BadScans { fault: ScanFault::Contradicting, count, scans: *revisiting, since })
         });
         let are_too_many =
             |bad: &BadScans, most: f64| bad.scans >= LEAST_SCANS && bad.count as f64 > most * bad.scans as f64;

@@ -204,12 +204,11 @@ impl ScanMapper {
             return Ok(());
         }
         robot.sent_until = Some(last);
-        let contradictions = robot.contradictions();
-        if is_end {
+        if let Some(contradictions) = robot.test_map(is_end).filter(|_| is_end) {
             output.count("scans that see walls again", contradictions.revisiting as u64);
             output.count("scans that contradict walls", contradictions.contradicting.len() as u64);
         }
-        if let Some(bad) = robot.bad_scans(&contradictions) {
+        if let Some(bad) = robot.bad_scans() {
             return send_lost(name, &why_bad(&bad, bad.since.seconds_since(first)), output);
         }
         if robot.is_mirrored() {
@@ -245,8 +244,8 @@ fn why_bad(bad: &BadScans, since: f64) -> String {
              or its scans may be wrong"
         ),
         ScanFault::Contradicting => format!(
-            "{count} of {scans} scans look through walls that it saw at other times, the first of them {since:.1} s after its first \
-             scan, as where a map is bent or doubled. To use it, record better odometry, or {CUT_THERE}. To see the map, give \
+            "{count} of {scans} scans that see walls again look through them, the first of them {since:.1} s after its first scan, as \
+             where a map is bent or doubled. To use it, record better odometry, or {CUT_THERE}. To see the map, give \
              --set mapper.max_contradicting=1"
         ),
     }
@@ -285,7 +284,7 @@ fn explain(
         );
         return send_lost(name, &reason, output);
     }
-    if robot.drawn.is_some() && robot.map().0.is_none() && robot.bad_scans(&robot.contradictions()).is_none() {
+    if robot.drawn.is_some() && robot.map().0.is_none() && robot.bad_scans().is_none() {
         let reason = format!("its scans show nothing within {} m", parameters.max_range);
         return send_lost(name, &reason, output);
     }

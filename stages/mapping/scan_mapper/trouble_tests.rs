@@ -178,9 +178,14 @@ fn no_map_is_sent_whose_walls_are_looked_through_unless_it_is_asked_for() {
         }
         bench
     };
-    let mut bench = drive("mode = 'offline'");
-    assert!(bench.map(30.0).0.is_none());
-    let reasons = lost(&mut bench);
-    assert!(reasons.len() == 1 && reasons[0].contains("look through walls that it saw at other times"), "{reasons:?}");
+    for parameters in ["mode = 'offline'", "interval = 100.0", "interval = 14.0"] {
+        let mut bench = drive(parameters);
+        // What was sent before walls were looked through stays.
+        let sent = usize::from(parameters == "interval = 14.0");
+        assert_eq!(bench.map(30.0).1, sent, "{parameters}");
+        let reasons = lost(&mut bench);
+        let is_said = |reason: &String| reason.contains("that see walls again look through them");
+        assert!(!reasons.is_empty() && reasons.iter().all(is_said), "{reasons:?}");
+    }
     assert!(drive("mode = 'offline'\nmax_contradicting = 1.0").map(30.0).0.is_some());
 }
