@@ -160,6 +160,19 @@ fn robots_whose_odometry_drifts_are_merged() {
     gridweave(folder, &raw).assert(0, &[]);
     merge(folder).assert(0, &["maps are built from scans", "merged 2 of 2"]);
     assert_eq!(judged(folder), [1, 0].map(Value::from));
+    assert_eq!(refined_together(folder), 2);
+    let apart = ["run", "scan_merge", "--input", "scans.mcap", "--output", "apart.mcap", "--summary", "summary.json"];
+    gridweave(folder, &[&apart[..], &["--set", "mapper.joint_refinement=false"]].concat())
+        .assert(0, &["merged 2 of 2"]);
+    assert_eq!(refined_together(folder), Value::Null);
+}
+
+/// How many robots were refined in one pose graph.
+fn refined_together(folder: &Path) -> Value {
+    let summary: Value = serde_json::from_slice(&std::fs::read(folder.join("summary.json")).unwrap()).unwrap();
+    let stages = summary["stages"].as_array().unwrap();
+    let mapper = stages.iter().find(|stage| stage[0] == "mapper").unwrap();
+    mapper[1]["counts"]["robots refined together"].clone()
 }
 
 /// The lidar of robot2 sees too little to find its way.

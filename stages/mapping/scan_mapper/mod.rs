@@ -12,6 +12,9 @@
 //!   loops are closed, and the map is drawn anew after each closure, so that each wall is there once;
 //! - **with scans only**, likewise, with odometry from the scans themselves.
 //!
+//! At the end the robots whose maps are accepted as merged are refined [together](crate::mapping::slam::joint_poses), each
+//! in its own frame, so that what one robot saw straightens the map of another.
+//!
 //! A robot whose scans hardly ever lie on each other has lost its way: no map of it is sent.
 //!
 //! - [`ScanBeams`]: the beams of a scan from the base of the robot, within the lidar's limits.
@@ -19,6 +22,7 @@
 
 mod beams;
 mod continuous_odometry;
+mod joint_refinement;
 mod parameters;
 mod robot;
 mod scan_map;

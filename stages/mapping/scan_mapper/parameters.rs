@@ -71,6 +71,9 @@ pub struct ScanMapperParameters {
     /// times look through them, as where a map is bent or doubled.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub max_contradicting: f64,
+    /// Whether, at the end, the scans of robots whose maps are merged without doubt are refined together in one pose
+    /// graph: what one robot saw then straightens the map of another.
+    pub joint_refinement: bool,
 }
 
 impl Default for ScanMapperParameters {
@@ -91,6 +94,7 @@ impl Default for ScanMapperParameters {
             step_yaw: 0.2,
             odometry_deviation: 0.1,
             max_contradicting: 0.06,
+            joint_refinement: true,
         }
     }
 }

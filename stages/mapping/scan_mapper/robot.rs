@@ -150,6 +150,14 @@ impl Robot {
         }
     }
 
+    /// The same, to be changed.
+    pub(super) fn slam_map_mut(&mut self) -> Option<&mut SlamMap> {
+        match &mut self.localization {
+            Localization::ByOdometry(slam) | Localization::ByScans(slam, _) => Some(slam),
+            Localization::NotYet | Localization::ByPoses(_) => None,
+        }
+    }
+
     /// Whether its poses are found by SLAM.
     pub(super) fn is_by_slam(&self) -> bool {
         self.slam_map().is_some()
@@ -213,9 +221,7 @@ impl Robot {
         } else {
             self.draw_at_poses(parameters, is_end, outcome);
         }
-        let (Localization::ByOdometry(slam) | Localization::ByScans(slam, _)) = &mut self.localization else {
-            return;
-        };
+        let Some(slam) = self.slam_map_mut() else { return };
         if is_end {
             slam.finish();
         }
@@ -276,9 +282,7 @@ impl Robot {
 
     /// Tests the map that is built by SLAM, at the end in any case: how often its scans contradict each other.
     pub(super) fn test_map(&mut self, is_end: bool) -> Option<&Contradictions> {
-        let (Localization::ByOdometry(slam) | Localization::ByScans(slam, _)) = &mut self.localization else {
-            return None;
-        };
+        let slam = self.slam_map_mut()?;
         slam.test(is_end);
         slam.contradictions()
     }

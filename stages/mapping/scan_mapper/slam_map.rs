@@ -154,6 +154,27 @@ impl SlamMap {
         Some(LocatedScan { pose: last * found.pose, ..found })
     }
 
+    /// The scans with their poses, relative to the first.
+    pub(super) fn trajectory(&self) -> &Trajectory {
+        &self.trajectory
+    }
+
+    /// Pose of the first scan in the map.
+    pub(super) fn transform_map_trajectory(&self) -> Pose2 {
+        self.scans.first().map_or_else(Pose2::identity, |first| first.odometry)
+    }
+
+    /// Positions of the lidar at the scans, in the frame of the base.
+    pub(super) fn lidars(&self) -> Vec<Point2> {
+        self.scans.iter().map(|scan| scan.transform_base_lidar.translation.vector.into()).collect()
+    }
+
+    /// Moves the scans to poses in any frame; the map's frame stays where it was.
+    pub(super) fn move_to(&mut self, poses: Vec<Pose2>) {
+        self.trajectory.move_to(poses);
+        self.forget_map();
+    }
+
     /// Looks for the last loop closures, when there will be no more scans.
     pub(super) fn finish(&mut self) {
         if self.trajectory.finish() {
@@ -170,7 +191,7 @@ impl SlamMap {
 
     /// Pose of a scan in the map, whose frame is that of odometry at the first scan.
     fn pose(&self, scan: usize) -> Pose2 {
-        self.scans[0].odometry * self.trajectory.poses()[scan]
+        self.transform_map_trajectory() * self.trajectory.poses()[scan]
     }
 
     /// Draws the scans that are not in the map. Returns how many were left out, as the map would get too large.
@@ -238,8 +259,7 @@ impl SlamMap {
             count == *tested || !is_end && (count as f64) < TESTED_AGAIN * *tested as f64
         };
         if !self.tested.as_ref().is_some_and(is_tested) {
-            let lidars = self.scans.iter().map(|scan| scan.transform_base_lidar.translation.vector.into());
-            let found = self.trajectory.contradictions(&lidars.collect::<Vec<Point2>>());
+            let found = self.trajectory.contradictions(&self.lidars());
             self.tested = Some((count, found));
         }
     }

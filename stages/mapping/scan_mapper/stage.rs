@@ -1,5 +1,6 @@
 //! The stage `scan_mapper`.
 
+use super::joint_refinement::refine_together;
 use super::robot::{Robot, ScanOutcome};
 use super::slam_map::{BadScans, LossCause, ScanFault};
 use super::{MappingMode, ScanBeams, ScanMapperParameters};
@@ -171,7 +172,13 @@ impl ScanMapper {
 
     /// Adds the scans with known poses, and sends the map if it is time.
     fn draw_and_send(&mut self, name: &str, is_end: bool, output: &Output<Drawn>) -> Result<(), StageError> {
-        let Some(robot) = self.robots.get_mut(name) else { return Ok(()) };
+        self.draw(name, is_end, output);
+        self.send(name, is_end, output)
+    }
+
+    /// Adds the scans with known poses.
+    fn draw(&mut self, name: &str, is_end: bool, output: &Output<Drawn>) {
+        let Some(robot) = self.robots.get_mut(name) else { return };
         robot.draw(&self.parameters, is_end, |outcome| match outcome {
             ScanOutcome::Used => {}
             ScanOutcome::NoPose => {
@@ -191,6 +198,11 @@ impl ScanMapper {
         if let Some((seconds, cause)) = robot.take_lost_way() {
             output.warn(lost_way(name, seconds, cause));
         }
+    }
+
+    /// Sends the poses that are known, and the map if it is time.
+    fn send(&mut self, name: &str, is_end: bool, output: &Output<Drawn>) -> Result<(), StageError> {
+        let Some(robot) = self.robots.get_mut(name) else { return Ok(()) };
         let Some([first, last]) = robot.drawn else { return Ok(()) };
         let is_offline = self.parameters.mode == MappingMode::Offline && robot.is_by_slam();
         if !is_offline {
@@ -222,11 +234,18 @@ impl ScanMapper {
 
     fn finish(&mut self, output: &Output<Drawn>) -> Result<(), StageError> {
         let names: Vec<String> = self.robots.keys().cloned().collect();
-        for name in names {
-            if let Some(robot) = self.robots.get_mut(&name) {
+        for name in &names {
+            if let Some(robot) = self.robots.get_mut(name) {
                 robot.decide(&self.parameters, true);
             }
-            self.draw_and_send(&name, true, output)?;
+            self.draw(name, true, output);
+        }
+        if self.parameters.joint_refinement {
+            let count = refine_together(&mut self.robots, &self.parameters);
+            output.count("robots refined together", count as u64);
+        }
+        for name in names {
+            self.send(&name, true, output)?;
             if let Some(robot) = self.robots.get_mut(&name) {
                 explain(&name, robot, &self.parameters, output)?;
             }

@@ -1,5 +1,4 @@
-//! Scans that contradict the map of which they are part: their beams pass through walls that the robot saw at other
-//! times.
+//! Scans that contradict the map of which they are part: their beams pass through walls that were seen at other times.
 //!
 //! A beam that ended somewhere has passed all that lies before. Where a map is doubled or bent, the beams of one visit
 //! pass through the walls of another (Mazuran et al. 2014, "A statistical measure for map consistency in SLAM"). No
@@ -44,26 +43,31 @@ pub(super) struct PlacedScan<'a> {
     pub(super) pose: Pose2,
     /// Position of the lidar in the frame of the base.
     pub(super) lidar: Point2,
+    /// Number of the drive of which it is part.
+    pub(super) drive: usize,
 }
 
 /// The walls of all scans.
-struct Walls {
+struct Walls<'a> {
+    scans: &'a [PlacedScan<'a>],
+    /// Least number of scans of one drive between those of other times.
+    apart: usize,
     index: PointIndex,
     /// For each point of the index its scan and its normal.
     seen: Vec<(usize, Vector2<f64>)>,
 }
 
-/// Compares each scan with the walls of those that are more than `apart` scans before or after it.
+/// Compares each scan with the walls of those that are of other drives, or more than `apart` scans before or after it.
 pub(super) fn find_contradictions(scans: &[PlacedScan<'_>], apart: usize) -> Contradictions {
-    let walls = Walls::of(scans);
-    let judge = |scan: usize| walls.is_contradicted(scan, &scans[scan], apart);
+    let walls = Walls::of(scans, apart);
+    let judge = |scan: usize| walls.is_contradicted(scan);
     let judged: Vec<Option<bool>> = (0..scans.len()).into_par_iter().map(judge).collect();
     let contradicting = (0..scans.len()).filter(|scan| judged[*scan] == Some(true)).collect();
     Contradictions { revisiting: judged.iter().flatten().count(), contradicting }
 }
 
-impl Walls {
-    fn of(scans: &[PlacedScan<'_>]) -> Self {
+impl<'a> Walls<'a> {
+    fn of(scans: &'a [PlacedScan<'a>], apart: usize) -> Self {
         let (mut places, mut unsorted) = (Vec::new(), Vec::new());
         for (number, scan) in scans.iter().enumerate() {
             for point in scan.points {
@@ -74,17 +78,23 @@ impl Walls {
             }
         }
         let (index, order) = PointIndex::new(&places, STEP);
-        Self { index, seen: order.into_iter().map(|place| unsorted[place]).collect() }
+        Self { scans, apart, index, seen: order.into_iter().map(|place| unsorted[place]).collect() }
+    }
+
+    /// Whether two scans were made at different times.
+    fn are_apart(&self, one: usize, other: usize) -> bool {
+        one.abs_diff(other) > self.apart || self.scans[one].drive != self.scans[other].drive
     }
 
     /// Whether the beams of a scan pass through walls of other times; `None` if too few meet any.
-    fn is_contradicted(&self, number: usize, scan: &PlacedScan<'_>, apart: usize) -> Option<bool> {
+    fn is_contradicted(&self, number: usize) -> Option<bool> {
+        let scan = &self.scans[number];
         let lidar = scan.pose * scan.lidar;
         let (mut passing, mut meeting) = (0, 0);
         for point in scan.points.iter().step_by(scan.points.len().div_ceil(BEAMS).max(1)) {
             let end = scan.pose * point.place;
-            let passes = self.is_passed(number, &lidar, &end, apart);
-            let is_of_other_time = |index: usize| self.seen[index].0.abs_diff(number) > apart;
+            let passes = self.is_passed(number, &lidar, &end);
+            let is_of_other_time = |index: usize| self.are_apart(self.seen[index].0, number);
             passing += usize::from(passes);
             meeting += usize::from(passes || self.index.within(&end, END_REACH).any(is_of_other_time));
         }
@@ -93,7 +103,7 @@ impl Walls {
 
     /// Whether a beam passes through a wall of other times that two scans have seen: what only one has seen may have been
     /// a person.
-    fn is_passed(&self, number: usize, lidar: &Point2, end: &Point2, apart: usize) -> bool {
+    fn is_passed(&self, number: usize, lidar: &Point2, end: &Point2) -> bool {
         let way = end - lidar;
         let range = way.norm();
         let along = way / range;
@@ -103,7 +113,7 @@ impl Walls {
             let at = lidar + along * (MARGIN + STEP * step as f64);
             for index in self.index.within(&at, REACH) {
                 let (scan, normal) = &self.seen[index];
-                if scan.abs_diff(number) <= apart || normal.dot(&along).abs() < LEAST_COSINE {
+                if !self.are_apart(*scan, number) || normal.dot(&along).abs() < LEAST_COSINE {
                     continue;
                 }
                 if witness.is_some_and(|witness| witness != *scan) {

@@ -2,7 +2,7 @@
 
 use super::likelihood_field::LikelihoodField;
 use super::scan_points::{SPACING, ScanPoint};
-use crate::shared::geometry::{Point2, PointIndex, Pose2, quarter_turn};
+use crate::shared::geometry::{Neighbour, Point2, PointIndex, Pose2, quarter_turn};
 use crate::shared::walls::{CORRELATION_LENGTH, DEVIATION, LEAST_NORMAL_AGREEMENT};
 use nalgebra::{Matrix3, Vector2, Vector3};
 use std::f64::consts::TAU;
@@ -95,10 +95,9 @@ impl LocalMap {
     /// ICP variant using a point-to-line metric").
     pub fn register(&self, scan: &[ScanPoint], guess: &Pose2, prior: Option<(&Pose2, &Matrix3<f64>)>) -> Match {
         let mut pose = *guess;
-        // What each point was nearest to in the round before is near it in the next.
-        let mut nearest = vec![usize::MAX; scan.len()];
+        let mut lookups = vec![Lookup::default(); scan.len()];
         for radius in RADII {
-            let (mut matrix, mut vector, _) = self.equations(scan, &pose, radius, &mut nearest);
+            let (mut matrix, mut vector, _) = self.equations(scan, &pose, radius, &mut lookups);
             if let Some((mean, information)) = prior {
                 let off = Vector3::new(
                     mean.translation.x - pose.translation.x,
@@ -117,30 +116,29 @@ impl LocalMap {
                 break;
             }
         }
-        let (information, _, matched) = self.equations(scan, &pose, LAST_RADIUS, &mut nearest);
+        let (information, _, matched) = self.equations(scan, &pose, LAST_RADIUS, &mut lookups);
         Match { pose, information, matched }
     }
 
-    /// Normal equations of a small move (x, y, yaw about the points' frame), and the share of matched points. `nearest`
-    /// has for each point the index of the spot or surface that may be near it, and is given that of the nearest.
+    /// Normal equations of a small move (x, y, yaw about the points' frame), and the share of matched points. `lookups`
+    /// has for each point what was found for it before.
     fn equations(
         &self,
         scan: &[ScanPoint],
         pose: &Pose2,
         radius: f64,
-        nearest: &mut [usize],
+        lookups: &mut [Lookup],
     ) -> (Matrix3<f64>, Vector3<f64>, f64) {
         let (mut matrix, mut vector) = (Matrix3::zeros(), Vector3::zeros());
         let mut matched = 0;
         // Neighbouring points of a wall are one measurement.
         let information = SPACING / CORRELATION_LENGTH / (DEVIATION * DEVIATION);
         let width = WEIGHT_WIDTH * radius;
-        for (point, nearest) in scan.iter().zip(nearest) {
+        for (point, lookup) in scan.iter().zip(lookups) {
             let arm = pose.rotation * point.place.coords;
             let place = pose.translation.vector + arm;
             let index = if point.normal.is_some() { &self.index } else { &self.spots };
-            let Some(found) = index.nearest_from(&place.into(), radius, *nearest) else { continue };
-            *nearest = found.index;
+            let Some(found) = lookup.nearest(index, place, radius) else { continue };
             let Some(normal) = point.normal else {
                 let off = self.spots.points()[found.index].coords - place;
                 let weight = information * (-0.5 * off.norm_squared() / (width * width)).exp();
@@ -165,6 +163,37 @@ impl LocalMap {
             vector += weight * off * row;
         }
         (matrix, vector, f64::from(matched) / scan.len().max(1) as f64)
+    }
+}
+
+/// What was found near a point in the round before, which is near it in the next.
+#[derive(Clone, Copy)]
+struct Lookup {
+    /// Index of the nearest.
+    nearest: usize,
+    /// A place where nothing was within a radius, metres.
+    empty: (Vector2<f64>, f64),
+}
+
+impl Default for Lookup {
+    fn default() -> Self {
+        Self { nearest: usize::MAX, empty: (Vector2::zeros(), 0.0) }
+    }
+}
+
+impl Lookup {
+    /// The nearest neighbour of a place within a radius.
+    fn nearest(&mut self, index: &PointIndex, place: Vector2<f64>, radius: f64) -> Option<Neighbour> {
+        let (empty, within) = self.empty;
+        if radius < within && (place - empty).norm() < within - radius {
+            return None;
+        }
+        let found = index.nearest_from(&place.into(), radius, self.nearest);
+        match found {
+            Some(found) => self.nearest = found.index,
+            None => self.empty = (place, radius),
+        }
+        found
     }
 }
 

@@ -6,6 +6,7 @@ use super::pose_graph::{Constraint, PoseGraph, turned_information};
 use super::scan_points::ScanPoint;
 use super::scan_registration::{GAIN, reach, thinned};
 use nalgebra::Matrix3;
+use std::cell::LazyCell;
 use std::ops::Range;
 
 /// Distance of two submaps up to which they may have walls in common, metres, beyond what they are uncertain.
@@ -34,16 +35,28 @@ const INFORMATION_SHARE: f64 = 0.3;
 pub(super) struct Revisit<'a> {
     pub(super) graph: &'a PoseGraph,
     /// The points of each scan.
-    pub(super) scans: &'a [Vec<ScanPoint>],
+    pub(super) scans: &'a [&'a [ScanPoint]],
     /// The submaps, as ranges of scans; the last is the one that is looked for.
     pub(super) submaps: &'a [Range<usize>],
+    /// The scans of each drive, which follow each other in time.
+    pub(super) drives: &'a [Range<usize>],
     /// First scan of the local map: what is in it is registered already.
     pub(super) recent: usize,
 }
 
-/// Looks for the last submap in the earlier ones that may be at its place. Each that fits is the pose of its middle
-/// scan in that of the earlier submap.
+/// Looks for the last submap in the earlier ones that may be at its place, by what is known of their relative poses. Each
+/// that fits is the pose of its middle scan in that of the earlier submap.
 pub(super) fn find_loop_closures(revisit: &Revisit<'_>) -> Vec<Constraint> {
+    let Some(own) = revisit.submaps.last() else { return Vec::new() };
+    let covariances = LazyCell::new(|| revisit.graph.covariances_from(middle(own)));
+    find_closures(revisit, |scan| covariances[scan])
+}
+
+/// The same, where `covariance` gives that of a scan in the frame of the last submap; none if it is not known.
+pub(super) fn find_closures(
+    revisit: &Revisit<'_>,
+    covariance: impl Fn(usize) -> Option<Matrix3<f64>>,
+) -> Vec<Constraint> {
     let Some((own, earlier)) = revisit.submaps.split_last() else { return Vec::new() };
     let centre = middle(own);
     let poses = &revisit.graph.poses;
@@ -57,10 +70,9 @@ pub(super) fn find_loop_closures(revisit: &Revisit<'_>) -> Vec<Constraint> {
         return Vec::new();
     }
     candidates.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let covariances = revisit.graph.covariances_from(centre);
     let points = revisit.points_of_submap(own);
     let may_be_there = |(distance, other): (f64, usize)| {
-        let covariance = covariances[middle(&earlier[other])]?;
+        let covariance = covariance(middle(&earlier[other]))?;
         let deviation = (covariance.m11 + covariance.m22).sqrt();
         (distance <= COMMON_DISTANCE + 2.0 * deviation).then_some((other, covariance))
     };
@@ -74,6 +86,11 @@ pub(super) fn middle(scans: &Range<usize>) -> usize {
 }
 
 impl Revisit<'_> {
+    /// Number of the drive of a scan.
+    pub(super) fn drive(&self, scan: usize) -> usize {
+        self.drives.partition_point(|drive| drive.end <= scan)
+    }
+
     /// Points of a submap in the frame of its middle scan.
     fn points_of_submap(&self, scans: &Range<usize>) -> Vec<ScanPoint> {
         let into = self.graph.poses[middle(scans)].inverse();
@@ -88,15 +105,25 @@ impl Revisit<'_> {
         scans.clone().flat_map(of_scan).collect()
     }
 
-    /// The walls of a submap and of those before and after it, as the later one need not begin where it did, from scans
-    /// before `until`, in the frame of the submap's middle scan.
-    pub(super) fn map_around(&self, submap: usize, until: usize) -> LocalMap {
+    /// The scans before `until` of a submap and of those before and after it on the same drive, as a later one need not
+    /// begin where it did.
+    pub(super) fn scans_around(&self, submap: usize, until: usize) -> Range<usize> {
+        let own = &self.submaps[submap];
+        let drive = self.drive(own.start);
+        let beside = |other: Option<usize>| {
+            let other = self.submaps.get(other?)?;
+            (self.drive(other.start) == drive && other.end <= until).then_some(other)
+        };
+        let first = beside(submap.checked_sub(1)).map_or(own.start, |before| before.start);
+        let last = beside(submap.checked_add(1)).map_or(own.end, |after| after.end);
+        first..last
+    }
+
+    /// The walls of scans at their poses in the frame of one of them.
+    pub(super) fn map_of(&self, scans: Range<usize>, frame: usize) -> LocalMap {
         let poses = &self.graph.poses;
-        let first = self.submaps[submap.saturating_sub(1)].start;
-        let after = self.submaps.get(submap + 1).filter(|after| after.end <= until);
-        let last = after.map_or(self.submaps[submap].end, |after| after.end);
-        let into = poses[middle(&self.submaps[submap])].inverse();
-        LocalMap::new((first..last).map(|scan| (into * poses[scan], &self.scans[scan][..])))
+        let into = poses[frame].inverse();
+        LocalMap::new(scans.map(|scan| (into * poses[scan], self.scans[scan])))
     }
 
     /// Looks for the points of the scan `centre` and those around it in an earlier submap. `covariance` is that of
@@ -111,7 +138,7 @@ impl Revisit<'_> {
         let poses = &self.graph.poses;
         let at = middle(&self.submaps[other]);
         let deviations = [(covariance.m11 + covariance.m22).sqrt(), covariance.m33.sqrt()];
-        let map = self.map_around(other, self.recent);
+        let map = self.map_of(self.scans_around(other, self.recent), at);
         let mean = poses[at].inv_mul(&poses[centre]);
         let half = |axis: usize| (WINDOW * deviations[axis]).clamp(LEAST_WINDOW[axis], LARGEST_WINDOW[axis]);
         let window = [half(0), half(0), half(1)];

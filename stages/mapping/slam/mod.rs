@@ -1,11 +1,12 @@
-//! SLAM of one robot from the scans of its lidar and its odometry.
+//! SLAM of robots from the scans of their lidars and their odometry.
 //!
 //! Each scan is registered on the [`LocalMap`] of those around it: a correlative search over the uncertainty of
 //! odometry finds the basin (Olson 2009), and point-to-line registration the pose (Censi 2008). Scans are gathered in
 //! submaps of some metres. A finished submap is searched in each earlier one that may be at the same place, by branch
 //! and bound on a likelihood field; what fits, and fits nowhere else, becomes a loop closure. Scans are the nodes of a
 //! pose graph, whose most likely poses are solved for after each closure, with a robust weight for closures. At the end
-//! each scan is registered on what was seen at its place at other times.
+//! each scan is registered on what was seen at its place at other times, by any of the robots whose relative poses are known
+//! ([`joint_poses`]).
 //!
 //! The division into a local registration and submaps that are searched for loop closures by branch and bound is that
 //! of Cartographer (Hess et al. 2016, "Real-time loop closure in 2D LIDAR SLAM"); a local map of the last scans, and a
@@ -15,6 +16,7 @@
 
 mod contradictions;
 mod correlative_search;
+mod joint_trajectories;
 mod likelihood_field;
 mod local_map;
 mod loop_closure;
@@ -28,6 +30,7 @@ mod tests;
 mod trajectory;
 
 pub use contradictions::Contradictions;
+pub use joint_trajectories::{FramedTrajectory, joint_contradictions, joint_poses};
 pub use local_map::LocalMap;
 pub use odometry_noise::OdometryNoise;
 pub use pose_graph::{Constraint, PoseGraph};

@@ -1,7 +1,7 @@
 //! Drives through a building whose walls are known, with odometry that drifts.
 
 use super::contradictions::{PlacedScan, find_contradictions};
-use super::{ScanPoint, Trajectory, scan_points};
+use super::{FramedTrajectory, ScanPoint, Trajectory, joint_contradictions, joint_poses, scan_points};
 use crate::shared::geometry::{Point2, Pose2, pose};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -156,7 +156,7 @@ fn scans_contradict_walls_that_were_drawn_elsewhere() {
         let mut placed = Vec::new();
         for (scan, (points, at)) in scans.iter().zip(&truth).enumerate() {
             let by = if scan < again { 0.0 } else { moved };
-            placed.push(PlacedScan { points, pose: pose(0.0, by, 0.0) * at, lidar: Point2::origin() });
+            placed.push(PlacedScan { points, pose: pose(0.0, by, 0.0) * at, lidar: Point2::origin(), drive: 0 });
         }
         find_contradictions(&placed, 40)
     };
@@ -167,6 +167,57 @@ fn scans_contradict_walls_that_were_drawn_elsewhere() {
     let is_along_it = |scan: &usize| *scan < 45 || *scan >= again;
     assert!(doubled.contradicting.len() > 50 && doubled.contradicting.iter().all(is_along_it), "{doubled:?}");
     let alone = scans.iter().zip(&truth).take(30);
-    let alone = alone.map(|(points, pose)| PlacedScan { points, pose: *pose, lidar: Point2::origin() });
+    let alone = alone.map(|(points, pose)| PlacedScan { points, pose: *pose, lidar: Point2::origin(), drive: 0 });
     assert_eq!(find_contradictions(&alone.collect::<Vec<_>>(), 40).revisiting, 0);
+}
+
+/// The trajectory of a robot with a lidar of some metres, whose odometry goes too far and turns too far along the poses.
+fn driven(walls: &[[Point2; 2]], truth: &[Pose2], metres: f64, seed: u64) -> Trajectory {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut trajectory = Trajectory::new(0.1);
+    let mut last = truth[0];
+    for at in truth {
+        let moved = last.inv_mul(at);
+        let (way, turn) = (moved.translation.vector * 1.05, 0.03 * moved.translation.vector.norm());
+        let mut points = scan(walls, at, &mut random);
+        points.retain(|point| point.place.coords.norm() < metres);
+        trajectory.add(&pose(way.x, way.y, moved.rotation.angle() + turn), points);
+        last = *at;
+    }
+    trajectory.finish();
+    trajectory
+}
+
+#[test]
+fn robots_in_one_graph_straighten_each_other_and_one_elsewhere_is_left_out() {
+    let (walls, truth) = (walls(), drive());
+    let closed = driven(&walls, &truth, 30.0, 5);
+    // Half a round, which has no loop, with a lidar that seldom sees how far it has come along a corridor.
+    let half = &truth[truth.len() / 4..truth.len() * 3 / 4];
+    let mut open = driven(&walls, half, 2.0, 6);
+    let alone = error(open.poses(), half);
+    let frame = truth[0].inv_mul(&half[0]) * pose(0.2, -0.1, 0.02);
+    let robots = [
+        FramedTrajectory { trajectory: &closed, frame: Pose2::identity() },
+        FramedTrajectory { trajectory: &open, frame },
+        FramedTrajectory { trajectory: &open, frame: pose(500.0, 0.0, 0.0) },
+    ];
+    let found = joint_poses(&robots);
+    let [Some(_), Some(together), None] = &found[..] else { panic!("{found:?}") };
+    let in_common = error(&together.iter().map(|pose| together[0].inv_mul(pose)).collect::<Vec<_>>(), half);
+    open.move_to(together.clone());
+    let after = error(open.poses(), half);
+    assert!(
+        after < 0.5 * alone && in_common < 0.5 * alone,
+        "{alone} m alone, and {after} m with the other, {in_common}"
+    );
+
+    let lidars = vec![Point2::origin(); truth.len()];
+    let contradicting = |by: f64| {
+        let moved: Vec<Pose2> = together.iter().map(|at| pose(0.0, by, 0.0) * at).collect();
+        let other = found[0].as_ref().unwrap();
+        joint_contradictions(&[(&closed, other, &lidars), (&open, &moved, &lidars)]).contradicting.len()
+    };
+    assert_eq!(contradicting(0.0), 0);
+    assert!(contradicting(0.6) > 30, "{}", contradicting(0.6));
 }

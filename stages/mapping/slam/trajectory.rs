@@ -5,7 +5,7 @@ use super::local_map::LocalMap;
 use super::loop_closure::{Revisit, find_loop_closures};
 use super::odometry_noise::OdometryNoise;
 use super::pose_graph::{Constraint, PoseGraph, turned_information};
-use super::revisits::register_on_revisited;
+use super::revisits::refine;
 use super::scan_points::ScanPoint;
 use super::scan_registration::{WELL_MATCHED, register};
 use crate::shared::geometry::{Point2, Pose2};
@@ -14,15 +14,11 @@ use std::cell::OnceCell;
 use std::ops::Range;
 
 /// Number of scans before one that make up its local map, at most, and the path that they may span, metres.
-const RECENT_SCANS: usize = 40;
+pub(super) const RECENT_SCANS: usize = 40;
 const RECENT_PATH: f64 = 20.0;
 /// Path of a submap, metres, and number of its scans, at most.
 const SUBMAP_PATH: f64 = 4.0;
 const SUBMAP_SCANS: usize = 30;
-/// How often the scans are registered on those of other times at the end, at most, and the move of a scan, metres,
-/// below which they are registered no more.
-const REFINEMENTS: usize = 8;
-const LEAST_REFINEMENT: f64 = 0.005;
 /// Share of the information of odometry about the yaw that counts where a scan is registered: wheels that turn too far do
 /// so for long, so that steps are not independent, and walls show the yaw nearly everywhere.
 const YAW_SHARE: f64 = 0.2;
@@ -88,6 +84,21 @@ impl Trajectory {
         &self.graph.poses
     }
 
+    /// The points of each scan, in the frame of the base.
+    pub(super) fn scans(&self) -> impl Iterator<Item = &[ScanPoint]> {
+        self.scans.iter().map(Vec::as_slice)
+    }
+
+    /// Odometry with the registration on the local map, and loop closures.
+    pub(super) fn constraints(&self) -> &[Constraint] {
+        &self.graph.constraints
+    }
+
+    /// The submaps, as ranges of scans.
+    pub(super) fn submaps(&self) -> &[Range<usize>] {
+        &self.submaps
+    }
+
     /// The loop closures that were found: poses of later scans in earlier ones.
     pub fn closures(&self) -> impl Iterator<Item = &Constraint> {
         self.graph.constraints.iter().filter(|constraint| constraint.is_loop)
@@ -111,9 +122,26 @@ impl Trajectory {
     /// Compares each scan with the walls that were seen at other times than its own. `lidars` are the positions of the
     /// lidar at the scans, in the frame of the base.
     pub fn contradictions(&self, lidars: &[Point2]) -> Contradictions {
-        let scans = self.scans.iter().zip(&self.graph.poses).zip(lidars);
-        let placed = scans.map(|((points, pose), lidar)| PlacedScan { points, pose: *pose, lidar: *lidar });
-        find_contradictions(&placed.collect::<Vec<_>>(), RECENT_SCANS)
+        find_contradictions(&self.placed_scans(&self.graph.poses, lidars, 0).collect::<Vec<_>>(), RECENT_SCANS)
+    }
+
+    /// The scans at poses that need not be those of the graph, as of the given drive.
+    pub(super) fn placed_scans<'a>(
+        &'a self,
+        poses: &'a [Pose2],
+        lidars: &'a [Point2],
+        drive: usize,
+    ) -> impl Iterator<Item = PlacedScan<'a>> {
+        let scans = self.scans.iter().zip(poses).zip(lidars);
+        scans.map(move |((points, pose), lidar)| PlacedScan { points, pose: *pose, lidar: *lidar, drive })
+    }
+
+    /// Moves the scans to poses in any frame; those of the first submap stay where they are as a whole.
+    pub fn move_to(&mut self, poses: Vec<Pose2>) {
+        let start = self.start();
+        self.graph.poses = poses;
+        self.hold(&start);
+        self.local_map.take();
     }
 
     /// Adds a scan of a robot that has moved by `moved` since the last one, by odometry. Returns whether a loop
@@ -197,7 +225,8 @@ impl Trajectory {
         self.submap_start = own.end;
         self.submaps.push(own);
         let recent = self.recent();
-        let revisit = Revisit { graph: &self.graph, scans: &self.scans, submaps: &self.submaps, recent };
+        let (drives, scans) = ([0..self.scans.len()], self.scans().collect::<Vec<_>>());
+        let revisit = Revisit { graph: &self.graph, scans: &scans, submaps: &self.submaps, drives: &drives, recent };
         let found = find_loop_closures(&revisit);
         let has_moved = !found.is_empty();
         self.graph.constraints.extend(found);
@@ -212,31 +241,19 @@ impl Trajectory {
     /// Finishes the last submap, and registers each scan on what was seen at its place at other times. Returns whether
     /// scans have moved.
     pub fn finish(&mut self) -> bool {
-        let mut has_moved = self.finish_submap();
-        let start: Vec<Pose2> =
-            self.submaps.first().map_or_else(Vec::new, |first| self.graph.poses[first.clone()].to_vec());
-        let known = self.graph.constraints.len();
-        for _ in 0..REFINEMENTS {
-            let recent = self.scans.len();
-            let revisit = Revisit { graph: &self.graph, scans: &self.scans, submaps: &self.submaps, recent };
-            let found = register_on_revisited(&revisit, RECENT_SCANS);
-            if found.is_empty() {
-                break;
-            }
-            self.graph.constraints.truncate(known);
-            self.graph.constraints.extend(found);
-            let before = self.graph.poses.clone();
-            self.graph.optimize();
-            has_moved = true;
-            let moves = before.iter().zip(&self.graph.poses);
-            let moved = moves.map(|(before, after)| (after.translation.vector - before.translation.vector).norm());
-            if moved.fold(0.0, f64::max) < LEAST_REFINEMENT {
-                break;
-            }
-        }
+        let has_closed = self.finish_submap();
+        let start = self.start();
+        let scans: Vec<&[ScanPoint]> = self.scans.iter().map(Vec::as_slice).collect();
+        let drive = 0..scans.len();
+        let has_moved = refine(&mut self.graph, &scans, &self.submaps, &[drive], RECENT_SCANS);
         self.hold(&start);
         self.local_map.take();
-        has_moved
+        has_closed || has_moved
+    }
+
+    /// The poses of the first submap.
+    fn start(&self) -> Vec<Pose2> {
+        self.submaps.first().map_or_else(Vec::new, |first| self.graph.poses[first.clone()].to_vec())
     }
 
     /// Moves all poses rigidly so that those of the first scans are where they were: the frame is known by all of these

@@ -1,0 +1,106 @@
+//! The trajectories of several robots in one pose graph.
+//!
+//! Where it is known how the maps of robots lie to each other, the submaps of one are searched in those of the others as
+//! they are in the robot's own, and each scan is registered on what any robot saw at its place. What one robot has
+//! closed by a loop then straightens what another has not (multi-robot pose graphs: Kim et al. 2010, "Multiple relative
+//! pose graphs for robust cooperative mapping"; as in Cartographer, all trajectories are nodes of one graph).
+
+use super::contradictions::{Contradictions, find_contradictions};
+use super::loop_closure::{Revisit, find_closures};
+use super::pose_graph::{Constraint, PoseGraph};
+use super::revisits::refine;
+use super::scan_points::ScanPoint;
+use super::trajectory::{RECENT_SCANS, Trajectory};
+use crate::shared::geometry::{Point2, Pose2};
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Standard deviations of the relative pose of two submaps by the given frames, metres and radians: maps that are bent lie
+/// to each other as a rigid pose only to some decimetres.
+const FRAME_DEVIATIONS: [f64; 2] = [0.3, 0.03];
+
+/// A trajectory, and the pose of its frame in one that all robots have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct FramedTrajectory<'a> {
+    /// The scans with their poses.
+    pub trajectory: &'a Trajectory,
+    /// `T_common_own`.
+    pub frame: Pose2,
+}
+
+/// The scans of several robots.
+#[derive(Default)]
+struct JointTrajectories<'a> {
+    graph: PoseGraph,
+    scans: Vec<&'a [ScanPoint]>,
+    submaps: Vec<Range<usize>>,
+    drives: Vec<Range<usize>>,
+}
+
+/// Finds the most likely poses of the scans of all robots together, in the common frame. Each trajectory must have walls
+/// in common with one before it: where none of its submaps lies on theirs, it has no poses.
+pub fn joint_poses(robots: &[FramedTrajectory<'_>]) -> Vec<Option<Vec<Pose2>>> {
+    let mut joint = JointTrajectories::default();
+    let drives: Vec<Option<Range<usize>>> = robots.iter().map(|robot| joint.add(robot)).collect();
+    refine(&mut joint.graph, &joint.scans, &joint.submaps, &joint.drives, RECENT_SCANS);
+    drives.into_iter().map(|drive| Some(joint.graph.poses[drive?].to_vec())).collect()
+}
+
+/// Compares each scan with the walls that other robots saw, and with those that its own robot saw at other times. For
+/// each robot the poses of the scans in the common frame, and the positions of the lidar in the frame of the base.
+pub fn joint_contradictions(robots: &[(&Trajectory, &[Pose2], &[Point2])]) -> Contradictions {
+    let placed = robots.iter().enumerate();
+    let placed = placed.flat_map(|(drive, (trajectory, poses, lidars))| trajectory.placed_scans(poses, lidars, drive));
+    find_contradictions(&placed.collect::<Vec<_>>(), RECENT_SCANS)
+}
+
+impl<'a> JointTrajectories<'a> {
+    /// Adds the scans of a robot, if they lie on those of the robots before. Returns their range.
+    fn add(&mut self, robot: &FramedTrajectory<'a>) -> Option<Range<usize>> {
+        let FramedTrajectory { trajectory, frame } = robot;
+        let (first, first_submap) = (self.scans.len(), self.submaps.len());
+        let known = self.graph.constraints.len();
+        let moved = |range: &Range<usize>| first + range.start..first + range.end;
+        self.graph.poses.extend(trajectory.poses().iter().map(|pose| frame * pose));
+        self.graph.constraints.extend(trajectory.constraints().iter().map(|own| Constraint {
+            from: first + own.from,
+            to: first + own.to,
+            ..*own
+        }));
+        self.scans.extend(trajectory.scans());
+        self.submaps.extend(trajectory.submaps().iter().map(moved));
+        let drive = first..self.scans.len();
+        self.drives.push(drive.clone());
+        if first == 0 {
+            return Some(drive);
+        }
+        let closures = self.closures_with_others(first_submap);
+        if closures.is_empty() {
+            self.graph.poses.truncate(first);
+            self.graph.constraints.truncate(known);
+            self.scans.truncate(first);
+            self.submaps.truncate(first_submap);
+            self.drives.pop();
+            return None;
+        }
+        self.graph.constraints.extend(closures);
+        self.graph.optimize();
+        Some(drive)
+    }
+
+    /// Loop closures of the last robot, whose submaps are those from the given one on, with the robots before it.
+    fn closures_with_others(&self, first_submap: usize) -> Vec<Constraint> {
+        let (others, own) = self.submaps.split_at(first_submap);
+        let [place, yaw] = FRAME_DEVIATIONS.map(|deviation| deviation.powi(2));
+        let covariance = Matrix3::from_diagonal(&Vector3::new(place, place, yaw));
+        let of_submap = |submap: &Range<usize>| {
+            let submaps: Vec<Range<usize>> = others.iter().chain([submap]).cloned().collect();
+            let recent = own[0].start;
+            let revisit =
+                Revisit { graph: &self.graph, scans: &self.scans, submaps: &submaps, drives: &self.drives, recent };
+            find_closures(&revisit, |_| Some(covariance))
+        };
+        own.par_iter().flat_map_iter(of_submap).collect()
+    }
+}
