@@ -87,13 +87,13 @@ fn register_on_revisited(revisit: &Revisit<'_>, apart: usize, matches: &mut [Sub
             near[submap].push((scan, place));
         }
     }
-    let on_submap = |(submap, (scans, matches)): (usize, (&Vec<(usize, usize)>, &mut SubmapMatches))| {
+    let of_submaps = near.par_iter().zip(matches).enumerate();
+    let found = of_submaps.flat_map_iter(|(submap, (scans, matches))| {
         matches.update(revisit, submap, scans.iter().map(|(scan, _)| *scan));
         let on_it = |order: &(usize, usize)| Some((*order, matches.matches.get(&order.0)?.1?));
         scans.iter().filter_map(on_it).collect::<Vec<_>>()
-    };
-    let of_submaps = near.par_iter().zip(matches).enumerate();
-    let mut found: Vec<((usize, usize), Constraint)> = of_submaps.flat_map_iter(on_submap).collect();
+    });
+    let mut found: Vec<((usize, usize), Constraint)> = found.collect();
     found.sort_by_key(|(order, _)| *order);
     found.into_iter().map(|(_, constraint)| constraint).collect()
 }

@@ -12,6 +12,7 @@ use crate::shared::geometry::{Point2, Pose2};
 use nalgebra::{Matrix3, UnitComplex, Vector2, Vector3};
 use std::cell::OnceCell;
 use std::ops::Range;
+use std::slice;
 
 /// Number of scans before one that make up its local map, at most, and the path that they may span, metres.
 pub(super) const RECENT_SCANS: usize = 40;
@@ -225,8 +226,9 @@ impl Trajectory {
         self.submap_start = own.end;
         self.submaps.push(own);
         let recent = self.recent();
-        let (drives, scans) = ([0..self.scans.len()], self.scans().collect::<Vec<_>>());
-        let revisit = Revisit { graph: &self.graph, scans: &scans, submaps: &self.submaps, drives: &drives, recent };
+        let (drive, scans) = (0..self.scans.len(), self.scans().collect::<Vec<_>>());
+        let drives = slice::from_ref(&drive);
+        let revisit = Revisit { graph: &self.graph, scans: &scans, submaps: &self.submaps, drives, recent };
         let found = find_loop_closures(&revisit);
         let has_moved = !found.is_empty();
         self.graph.constraints.extend(found);
@@ -245,7 +247,7 @@ impl Trajectory {
         let start = self.start();
         let scans: Vec<&[ScanPoint]> = self.scans.iter().map(Vec::as_slice).collect();
         let drive = 0..scans.len();
-        let has_moved = refine(&mut self.graph, &scans, &self.submaps, &[drive], RECENT_SCANS);
+        let has_moved = refine(&mut self.graph, &scans, &self.submaps, slice::from_ref(&drive), RECENT_SCANS);
         self.hold(&start);
         self.local_map.take();
         has_closed || has_moved
