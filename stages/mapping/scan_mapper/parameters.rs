@@ -71,6 +71,10 @@ pub struct ScanMapperParameters {
     /// times look through them, as where a map is bent or doubled.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub max_contradicting: f64,
+    /// Standard deviation of the position at which a tag is seen, where its message has no covariance, metres at a distance
+    /// of up to one metre, and proportionally more at a greater distance.
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 10))]
+    pub sighting_stddev: f64,
     /// Whether, at the end, the scans of robots whose maps are merged without doubt are refined together in one pose
     /// graph: what one robot saw then straightens the map of another.
     pub joint_refinement: bool,
@@ -94,6 +98,7 @@ impl Default for ScanMapperParameters {
             step_yaw: 0.2,
             odometry_deviation: 0.1,
             max_contradicting: 0.06,
+            sighting_stddev: 0.05,
             joint_refinement: true,
         }
     }

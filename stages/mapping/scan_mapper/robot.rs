@@ -2,7 +2,7 @@
 
 use super::continuous_odometry::ContinuousOdometry;
 use super::scan_odometry::ScanOdometry;
-use super::slam_map::{BadScans, LossCause, LostWay, SlamMap};
+use super::slam_map::{BadScans, LossCause, LostWay, SlamMap, TagSighting};
 use super::{ScanBeams, ScanMap, ScanMapperParameters, TooLarge};
 use crate::mapping::slam::Contradictions;
 use crate::shared::geometry::{Point2, Pose2, pose};
@@ -55,6 +55,8 @@ pub(super) struct Robot {
     /// The frame of the poses.
     pub(super) frame: Option<String>,
     waiting: VecDeque<(LogTime, ScanBeams)>,
+    /// Tags that were seen, for which no pose is known so far.
+    waiting_tags: VecDeque<(LogTime, TagSighting)>,
     first_scan: Option<LogTime>,
     /// Number of scans so far.
     scans: usize,
@@ -77,6 +79,7 @@ impl Robot {
             kept_odometry: Vec::new(),
             frame: None,
             waiting: VecDeque::new(),
+            waiting_tags: VecDeque::new(),
             first_scan: None,
             scans: 0,
             drawn: None,
@@ -90,6 +93,33 @@ impl Robot {
         self.first_scan.get_or_insert(time);
         self.scans += 1;
         self.waiting.push_back((time, scan));
+    }
+
+    /// Adds a tag that was seen at a time. It counts where poses are found by SLAM.
+    pub(super) fn add_tag(&mut self, time: LogTime, tag: TagSighting) {
+        if !matches!(self.localization, Localization::ByPoses(_)) {
+            self.waiting_tags.push_back((time, tag));
+        }
+        while self.waiting_tags.front().is_some_and(|(first, _)| time.seconds_since(*first) > PATIENCE) {
+            self.waiting_tags.pop_front();
+        }
+    }
+
+    /// Adds the tags for whose times odometry is known, and at the end of the log the remaining ones as well.
+    fn place_tags(&mut self, parameters: &ScanMapperParameters, is_end: bool) {
+        let (Localization::ByOdometry(slam) | Localization::ByScans(slam, _)) = &mut self.localization else { return };
+        let latest = self.odometry.latest_time();
+        let next_scan = self.waiting.front().map(|(time, _)| *time);
+        while let Some((time, tag)) = self.waiting_tags.pop_front() {
+            let is_due = latest.is_some_and(|latest| latest >= time) && next_scan.is_none_or(|next| next > time);
+            if !is_due && !is_end {
+                self.waiting_tags.push_front((time, tag));
+                break;
+            }
+            if let Some(at) = pose_at(&self.odometry, time, parameters) {
+                slam.see(time, &at, &tag);
+            }
+        }
     }
 
     /// Adds a pose in the map. Returns `false` if it is not used, as the map is built by odometry already, or as it
@@ -214,6 +244,7 @@ impl Robot {
                 let scan = without_motion(&scan, |delay| Some(odometry.motion(delay)));
                 let at = odometry.pose(time, &scan, slam, parameters);
                 self.kept_odometry.push((time, at));
+                self.odometry.add(time, position(&at));
                 let is_due = slam.is_due(time, &at, parameters);
                 let is_matched = !is_due || slam.add(time, &at, &scan);
                 outcome(if is_matched { ScanOutcome::Used } else { ScanOutcome::NotMatched });
@@ -221,6 +252,7 @@ impl Robot {
         } else {
             self.draw_at_poses(parameters, is_end, outcome);
         }
+        self.place_tags(parameters, is_end);
         let Some(slam) = self.slam_map_mut() else { return };
         if is_end {
             slam.finish();

@@ -60,6 +60,16 @@ pub(super) enum LossCause {
     ParallelWalls,
 }
 
+/// A tag as it was seen.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct TagSighting {
+    pub(super) tag: String,
+    /// Metres ahead of the base and to its left.
+    pub(super) place: Point2,
+    /// Standard deviation of the position, metres.
+    pub(super) deviation: f64,
+}
+
 /// So many bad scans that there is no map of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BadScans {
@@ -144,6 +154,17 @@ impl SlamMap {
             self.first_unmatched.get_or_insert(time);
         }
         is_matched
+    }
+
+    /// Adds the position at which a tag was seen from the pose `odometry`, metres ahead of the base and to its left, with
+    /// its standard deviation.
+    pub(super) fn see(&mut self, time: LogTime, odometry: &Pose2, tag: &TagSighting) {
+        let is_lost = self.lost_way.is_some_and(|lost| time >= lost.time);
+        let Some(scan) = self.scans.partition_point(|scan| scan.time <= time).checked_sub(1) else { return };
+        if !is_lost {
+            let place = self.scans[scan].odometry.inv_mul(odometry) * tag.place;
+            self.trajectory.see(scan, &tag.tag, place, tag.deviation);
+        }
     }
 
     /// Registers a scan without adding it, from the pose `guess` with the given standard deviations of position and

@@ -2,13 +2,17 @@
 
 use super::joint_refinement::refine_together;
 use super::robot::{Robot, ScanOutcome};
-use super::slam_map::{BadScans, LossCause, ScanFault};
+use super::slam_map::{BadScans, LossCause, ScanFault, TagSighting};
 use super::{MappingMode, ScanBeams, ScanMapperParameters};
 use crate::shared::geometry::Pose2;
 use crate::shared::robot_clock::Leap;
+use crate::tags::tag_localizer::sighting_deviation;
 use gridweave_runtime::message::LogTime;
-use gridweave_runtime::ros::{Header, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, RangeScan, UnmergedRobot};
+use gridweave_runtime::ros::{
+    Header, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, RangeScan, TagPosition, UnmergedRobot,
+};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
+use nalgebra::{Matrix2, Vector2};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The stage kind `scan_mapper`.
@@ -24,6 +28,7 @@ pub fn kind() -> StageKind {
     .optional_input("pose", "poses of the robots in their maps", ScanMapper::receive_pose)
     .optional_input("odometry", "odometry of robots without poses", ScanMapper::receive_odometry)
     .input("scan", "scans, relative to the bases of the robots", ScanMapper::receive_scan)
+    .optional_input("positions", "positions at which tags are seen from the robots", ScanMapper::receive_tag)
     .optional_input(
         "map",
         "maps that robots have sent themselves: none is drawn for these from there on",
@@ -136,6 +141,22 @@ impl ScanMapper {
         robot.add_scan(time, scan);
         robot.decide(&parameters, false);
         self.draw_and_send(message.robot(), false, output)
+    }
+
+    fn receive_tag(&mut self, message: Received<'_, TagPosition>, output: &Output<Drawn>) -> Result<(), StageError> {
+        let [xx, xy, yx, yy] = message.covariance;
+        let (place, covariance) = (Vector2::new(message.x, message.y), Matrix2::new(xx, xy, yx, yy));
+        let deviation = sighting_deviation(&place, &covariance, self.parameters.sighting_stddev);
+        let Some(robot) = self.robot(message.robot(), output) else { return Ok(()) };
+        let (time, leap) = robot.clock.time("position", message.header.stamp, message.log_time());
+        warn_of_leap(message.robot(), leap, output);
+        match deviation.filter(|_| !message.tag_id.is_empty()) {
+            Some(deviation) => {
+                robot.add_tag(time, TagSighting { tag: message.tag_id.clone(), place: place.into(), deviation });
+            }
+            None => output.warn(format!("tags of {} without id or position are left out", message.robot())),
+        }
+        Ok(())
     }
 
     /// A robot has sent its own map, which must not be replaced by another.

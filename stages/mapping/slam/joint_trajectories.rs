@@ -7,13 +7,14 @@
 
 use super::contradictions::{Contradictions, find_contradictions};
 use super::loop_closure::{Revisit, find_closures};
-use super::pose_graph::{Constraint, PoseGraph};
+use super::pose_graph::{Constraint, LandmarkSighting, PoseGraph};
 use super::revisits::refine;
 use super::scan_points::ScanPoint;
 use super::trajectory::{RECENT_SCANS, Trajectory};
 use crate::shared::geometry::{Point2, Pose2};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Standard deviations of the relative pose of two submaps by the given frames, metres and radians: maps that are bent lie
@@ -36,6 +37,8 @@ struct JointTrajectories<'a> {
     scans: Vec<&'a [ScanPoint]>,
     submaps: Vec<Range<usize>>,
     drives: Vec<Range<usize>>,
+    /// Numbers of the tags that any robot saw.
+    landmarks: BTreeMap<&'a str, usize>,
 }
 
 /// Finds the most likely poses of the scans of all robots together, in the common frame. Each trajectory must have walls
@@ -73,6 +76,7 @@ impl<'a> JointTrajectories<'a> {
         let drive = first..self.scans.len();
         self.drives.push(drive.clone());
         if first == 0 {
+            self.add_sightings(trajectory, first);
             return Some(drive);
         }
         let closures = self.closures_with_others(first_submap);
@@ -85,8 +89,24 @@ impl<'a> JointTrajectories<'a> {
             return None;
         }
         self.graph.constraints.extend(closures);
+        self.add_sightings(trajectory, first);
         self.graph.optimize();
         Some(drive)
+    }
+
+    /// Adds the tags that a robot saw, whose scans are those from the given one on.
+    fn add_sightings(&mut self, trajectory: &'a Trajectory, first: usize) {
+        let mut numbers = vec![0; trajectory.tags().len()];
+        for (tag, seen) in trajectory.tags() {
+            let next = self.landmarks.len();
+            numbers[seen.landmark] = *self.landmarks.entry(tag).or_insert(next);
+        }
+        let sightings = trajectory.sightings().iter();
+        self.graph.sightings.extend(sightings.map(|own| LandmarkSighting {
+            from: first + own.from,
+            landmark: numbers[own.landmark],
+            ..*own
+        }));
     }
 
     /// Loop closures of the last robot, whose submaps are those from the given one on, with the robots before it.

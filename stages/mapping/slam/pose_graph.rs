@@ -37,6 +37,19 @@ pub struct Constraint {
     pub is_loop: bool,
 }
 
+/// A measurement of the position of a landmark in the frame of a node. It may be wrong, as a loop closure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LandmarkSighting {
+    /// The node.
+    pub from: usize,
+    /// Number of the landmark.
+    pub landmark: usize,
+    /// Its position in the frame of the node, metres.
+    pub place: Point2,
+    /// Standard deviation of the position in each direction, metres.
+    pub deviation: f64,
+}
+
 /// Poses and the measurements between them. The first pose is fixed.
 #[derive(Clone, Debug, Default)]
 pub struct PoseGraph {
@@ -44,6 +57,8 @@ pub struct PoseGraph {
     pub poses: Vec<Pose2>,
     /// The measurements.
     pub constraints: Vec<Constraint>,
+    /// The measurements of landmarks, in the order of time.
+    pub sightings: Vec<LandmarkSighting>,
 }
 
 /// Turns the inverse of a covariance (x, y, yaw) into a frame in which its own is turned by `rotation`.
@@ -66,73 +81,53 @@ impl Constraint {
     }
 }
 
+impl LandmarkSighting {
+    /// The same, with the landmark as a node whose yaw nothing shows.
+    fn constraint(&self, nodes: usize) -> Constraint {
+        let by_axis = self.deviation.powi(-2);
+        Constraint {
+            from: self.from,
+            to: nodes + self.landmark,
+            transform: Pose2::from_parts(self.place.into(), UnitComplex::identity()),
+            information: Matrix3::from_diagonal(&Vector3::new(by_axis, by_axis, 0.0)),
+            is_loop: true,
+        }
+    }
+}
+
 impl PoseGraph {
     /// Moves the poses to the minimum of the squared residuals, by Gauss-Newton on SE(2). The weights of loop closures
     /// are wide at first, so that those of a long drive are not taken for wrong ones, and narrow with the steps
     /// (graduated non-convexity, Yang et al. 2020).
     pub fn optimize(&mut self) {
-        let loops = self.constraints.iter().filter(|constraint| constraint.is_loop);
-        let largest = loops.map(|constraint| constraint.squared_residual(&self.poses)).fold(0.0, f64::max);
+        let count = self.poses.len();
+        let mut nodes = self.poses.clone();
+        let landmarks = self.sightings.iter().map(|sighting| sighting.landmark + 1).max().unwrap_or(0);
+        nodes.resize(count + landmarks, Pose2::identity());
+        // A landmark is where it was seen first.
+        for LandmarkSighting { from, landmark, place, .. } in self.sightings.iter().rev() {
+            nodes[count + landmark] = Pose2::from_parts((nodes[*from] * place).into(), UnitComplex::identity());
+        }
+        let sightings = self.sightings.iter().map(|sighting| sighting.constraint(count));
+        let constraints: Vec<Constraint> = self.constraints.iter().copied().chain(sightings).collect();
+        let loops = constraints.iter().filter(|constraint| constraint.is_loop);
+        let largest = loops.map(|constraint| constraint.squared_residual(&nodes)).fold(0.0, f64::max);
         let mut width = (2.0 * largest / ROBUST).max(1.0);
         for _ in 0..MAX_STEPS {
-            let Some(moves) = self.step(width) else { return };
+            let Some(moves) = step(&nodes, &constraints, width) else { break };
             let mut longest = 0.0f64;
-            for (pose, step) in self.poses.iter_mut().zip(&moves).skip(1) {
+            for (pose, step) in nodes.iter_mut().zip(&moves).skip(1) {
                 pose.translation.vector += step.xy();
                 pose.rotation *= UnitComplex::new(step.z);
                 longest = longest.max(step.amax());
             }
             if width == 1.0 && longest < LEAST_STEP {
-                return;
+                break;
             }
             width = (width / NARROWING).max(1.0);
         }
-    }
-
-    /// A step of all poses. `None` if the equations have no solution.
-    fn step(&self, width: f64) -> Option<Vec<Vector3<f64>>> {
-        let count = self.poses.len();
-        let mut neighbours = vec![Vec::new(); count];
-        for Constraint { from, to, .. } in &self.constraints {
-            neighbours[*from].push(*to);
-            neighbours[*to].push(*from);
-        }
-        for of_node in &mut neighbours {
-            of_node.sort_unstable();
-            of_node.dedup();
-        }
-        let places: Vec<Point2> = self.poses.iter().map(|pose| pose.translation.vector.into()).collect();
-        let order = nested_dissection(&places, &neighbours);
-        let mut columns: Columns = vec![Vec::new(); count];
-        let mut vector = vec![Vector3::zeros(); count];
-        let mut add = |row: usize, column: usize, block: Matrix3<f64>| {
-            let (row, column) = (order[row], order[column]);
-            if row >= column {
-                columns[column].push((row, block));
-            }
-        };
-        for node in 0..count {
-            let fixed = if node == 0 { FIXED } else { DAMPING };
-            add(node, node, Matrix3::identity() * fixed);
-        }
-        for constraint in &self.constraints {
-            let (from, to) = (&self.poses[constraint.from], &self.poses[constraint.to]);
-            let residual = relative_pose::residual(from, to, &constraint.transform);
-            let squared = residual.dot(&(constraint.information * residual));
-            let information = constraint.information * constraint.weight(squared, width);
-            let [by_from, by_to] = relative_pose::derivatives(from, to);
-            let sides = [(constraint.from, by_from), (constraint.to, by_to)];
-            for (row, by_row) in &sides {
-                let weighted = by_row.transpose() * information;
-                vector[order[*row]] -= weighted * residual;
-                for (column, by_column) in &sides {
-                    add(*row, *column, weighted * by_column);
-                }
-            }
-        }
-        let solved = factor(&columns)?.solve(&vector);
-        let moves: Vec<Vector3<f64>> = order.iter().map(|&place| solved[place]).collect();
-        moves.iter().all(|step| step.iter().all(|value| value.is_finite())).then_some(moves)
+        nodes.truncate(count);
+        self.poses = nodes;
     }
 
     /// Covariances of all poses relative to one of them, in its frame, along the most certain path of measurements:
@@ -174,6 +169,52 @@ impl PoseGraph {
     }
 }
 
+/// A step of all nodes by their measurements. `None` if the equations have no solution.
+fn step(nodes: &[Pose2], constraints: &[Constraint], width: f64) -> Option<Vec<Vector3<f64>>> {
+    let count = nodes.len();
+    let mut neighbours = vec![Vec::new(); count];
+    for Constraint { from, to, .. } in constraints {
+        neighbours[*from].push(*to);
+        neighbours[*to].push(*from);
+    }
+    for of_node in &mut neighbours {
+        of_node.sort_unstable();
+        of_node.dedup();
+    }
+    let places: Vec<Point2> = nodes.iter().map(|pose| pose.translation.vector.into()).collect();
+    let order = nested_dissection(&places, &neighbours);
+    let mut columns: Columns = vec![Vec::new(); count];
+    let mut vector = vec![Vector3::zeros(); count];
+    let mut add = |row: usize, column: usize, block: Matrix3<f64>| {
+        let (row, column) = (order[row], order[column]);
+        if row >= column {
+            columns[column].push((row, block));
+        }
+    };
+    for node in 0..count {
+        let fixed = if node == 0 { FIXED } else { DAMPING };
+        add(node, node, Matrix3::identity() * fixed);
+    }
+    for constraint in constraints {
+        let (from, to) = (&nodes[constraint.from], &nodes[constraint.to]);
+        let residual = relative_pose::residual(from, to, &constraint.transform);
+        let squared = residual.dot(&(constraint.information * residual));
+        let information = constraint.information * constraint.weight(squared, width);
+        let [by_from, by_to] = relative_pose::derivatives(from, to);
+        let sides = [(constraint.from, by_from), (constraint.to, by_to)];
+        for (row, by_row) in &sides {
+            let weighted = by_row.transpose() * information;
+            vector[order[*row]] -= weighted * residual;
+            for (column, by_column) in &sides {
+                add(*row, *column, weighted * by_column);
+            }
+        }
+    }
+    let solved = factor(&columns)?.solve(&vector);
+    let moves: Vec<Vector3<f64>> = order.iter().map(|&place| solved[place]).collect();
+    moves.iter().all(|step| step.iter().all(|value| value.is_finite())).then_some(moves)
+}
+
 /// A node that the search of the most certain paths has reached.
 struct Reached {
     cost: f64,
@@ -210,7 +251,7 @@ mod tests {
     /// A drive around a square whose steps are each turned too far, and the true poses.
     fn square() -> (PoseGraph, Vec<Pose2>) {
         let mut truth = vec![Pose2::identity()];
-        let mut graph = PoseGraph { poses: vec![Pose2::identity()], constraints: Vec::new() };
+        let mut graph = PoseGraph { poses: vec![Pose2::identity()], ..Default::default() };
         for step in 1..40 {
             let turn = if step % 10 == 0 { std::f64::consts::FRAC_PI_2 } else { 0.0 };
             let moved = pose(0.5, 0.0, turn);
@@ -250,6 +291,27 @@ mod tests {
         misled.optimize();
         assert!(worst(&misled, &truth) < after + 0.2, "{}", worst(&misled, &truth));
         assert!(misled.constraints.last().unwrap().squared_residual(&misled.poses) > 100.0 * ROBUST);
+    }
+
+    #[test]
+    fn landmarks_that_are_seen_again_straighten_a_drive_and_one_that_was_mistaken_does_not_bend_it() {
+        let (mut graph, truth) = square();
+        let sighting = |from: usize, landmark: usize, at: Point2| LandmarkSighting {
+            from,
+            landmark,
+            place: truth[from].inverse() * at,
+            deviation: 0.05,
+        };
+        let [near, far] = [Point2::new(1.0, 1.0), Point2::new(-2.0, 0.5)];
+        graph.sightings = vec![sighting(0, 0, near), sighting(2, 1, far), sighting(38, 0, near), sighting(39, 1, far)];
+        let before = worst(&graph, &truth);
+        let mut misled = graph.clone();
+        graph.optimize();
+        let after = worst(&graph, &truth);
+        assert!(after < 0.3 * before && graph.poses.len() == truth.len(), "{before} {after}");
+        misled.sightings.push(LandmarkSighting { place: Point2::new(9.0, 4.0), ..sighting(20, 0, near) });
+        misled.optimize();
+        assert!(worst(&misled, &truth) < after + 0.2, "{}", worst(&misled, &truth));
     }
 
     #[test]

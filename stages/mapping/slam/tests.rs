@@ -221,3 +221,37 @@ fn robots_in_one_graph_straighten_each_other_and_one_elsewhere_is_left_out() {
     assert_eq!(contradicting(0.0), 0);
     assert!(contradicting(0.6) > 30, "{}", contradicting(0.6));
 }
+
+#[test]
+fn tags_that_are_seen_again_close_a_loop_where_scans_show_nothing() {
+    let truth = drive();
+    let mut random = ChaCha8Rng::seed_from_u64(7);
+    let mut trajectory = Trajectory::new(0.1);
+    let tags = [
+        ("family:1", Point2::new(3.0, 0.0)),
+        ("family:2", Point2::new(8.0, 3.0)),
+        ("family:3", Point2::new(22.0, 8.0)),
+    ];
+    let mut closed_on_the_way = false;
+    let mut before = 0.0;
+    for (step, at) in truth.iter().enumerate() {
+        let moved = truth[step.saturating_sub(1)].inv_mul(at);
+        let turn = moved.rotation.angle() + 0.006 * moved.translation.vector.norm();
+        closed_on_the_way |= trajectory.add(&pose(moved.translation.x, moved.translation.y, turn), Vec::new());
+        for (tag, place) in tags {
+            let seen = at.inverse() * place;
+            let noise = |random: &mut ChaCha8Rng| random.random_range(-0.03..0.03);
+            let seen = Point2::new(seen.x + noise(&mut random), seen.y + noise(&mut random));
+            if seen.coords.norm() < 4.0 && !closed_on_the_way {
+                before = error(trajectory.poses(), &truth[..=step]);
+            }
+            if seen.coords.norm() < 4.0 {
+                trajectory.see(step, tag, seen, 0.03);
+            }
+        }
+    }
+    trajectory.finish();
+    let after = error(trajectory.poses(), &truth);
+    assert!(closed_on_the_way, "a map on the way has the loop, too");
+    assert!(before > 1.0 && after < 0.3 * before, "{before} m before, {after} m after");
+}

@@ -4,13 +4,14 @@ use super::contradictions::{Contradictions, PlacedScan, find_contradictions};
 use super::local_map::LocalMap;
 use super::loop_closure::{Revisit, find_loop_closures};
 use super::odometry_noise::OdometryNoise;
-use super::pose_graph::{Constraint, PoseGraph, turned_information};
+use super::pose_graph::{Constraint, LandmarkSighting, PoseGraph, turned_information};
 use super::revisits::refine;
 use super::scan_points::ScanPoint;
 use super::scan_registration::{WELL_MATCHED, register};
 use crate::shared::geometry::{Point2, Pose2};
 use nalgebra::{Matrix3, UnitComplex, Vector2, Vector3};
 use std::cell::OnceCell;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::slice;
 
@@ -44,6 +45,15 @@ pub struct LocatedScan {
     pub deviation: f64,
 }
 
+/// A tag that was seen.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SeenTag {
+    /// Number of the landmark in the graph.
+    pub(super) landmark: usize,
+    /// The first and the last scan from which it was seen.
+    scans: [usize; 2],
+}
+
 /// The scans of a robot with their poses, in the frame of the first.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
@@ -58,6 +68,8 @@ pub struct Trajectory {
     submap_start: usize,
     /// Earlier submaps that are part of the local map.
     revisited: Vec<usize>,
+    /// The tags that were seen.
+    tags: BTreeMap<String, SeenTag>,
     /// The local map, once it was asked for since the last change.
     local_map: OnceCell<LocalMap>,
     unmatched: usize,
@@ -75,6 +87,7 @@ impl Trajectory {
             submaps: Vec::new(),
             submap_start: 0,
             revisited: Vec::new(),
+            tags: BTreeMap::new(),
             local_map: OnceCell::new(),
             unmatched: 0,
         }
@@ -93,6 +106,16 @@ impl Trajectory {
     /// Odometry with the registration on the local map, and loop closures.
     pub(super) fn constraints(&self) -> &[Constraint] {
         &self.graph.constraints
+    }
+
+    /// The positions at which tags were seen.
+    pub(super) fn sightings(&self) -> &[LandmarkSighting] {
+        &self.graph.sightings
+    }
+
+    /// The tags that were seen.
+    pub(super) fn tags(&self) -> &BTreeMap<String, SeenTag> {
+        &self.tags
     }
 
     /// The submaps, as ranges of scans.
@@ -175,6 +198,27 @@ impl Trajectory {
         (is_long || to - self.submap_start >= SUBMAP_SCANS) && self.finish_submap()
     }
 
+    /// Adds the position at which a tag was seen, in the frame of the base at a scan, with its standard deviation, metres.
+    /// Of several from one scan the first counts: they have the same errors.
+    pub fn see(&mut self, scan: usize, tag: &str, place: Point2, deviation: f64) {
+        if scan >= self.scans.len() {
+            return;
+        }
+        let landmark = match self.tags.get_mut(tag) {
+            Some(SeenTag { scans: [_, last], .. }) if *last >= scan => return,
+            Some(SeenTag { scans: [_, last], landmark }) => {
+                *last = scan;
+                *landmark
+            }
+            None => {
+                let landmark = self.tags.len();
+                self.tags.insert(tag.to_owned(), SeenTag { landmark, scans: [scan; 2] });
+                landmark
+            }
+        };
+        self.graph.sightings.push(LandmarkSighting { from: scan, landmark, place, deviation });
+    }
+
     /// Registers points on the local map, without adding them: the pose relative to the last scan, `guess` being what
     /// it is expected to be with these standard deviations of position and yaw. `None` if the points lie on no earlier
     /// ones.
@@ -224,20 +268,25 @@ impl Trajectory {
             return false;
         }
         self.submap_start = own.end;
-        self.submaps.push(own);
         let recent = self.recent();
+        let is_again = |SeenTag { scans: [first, last], .. }: &SeenTag| *first < recent && own.contains(last);
+        let has_seen_again = self.tags.values().any(is_again);
+        self.submaps.push(own);
+        if has_seen_again {
+            self.graph.optimize();
+        }
         let (drive, scans) = (0..self.scans.len(), self.scans().collect::<Vec<_>>());
         let drives = slice::from_ref(&drive);
         let revisit = Revisit { graph: &self.graph, scans: &scans, submaps: &self.submaps, drives, recent };
         let found = find_loop_closures(&revisit);
-        let has_moved = !found.is_empty();
+        let has_closed = !found.is_empty();
         self.graph.constraints.extend(found);
-        if has_moved {
+        if has_closed {
             self.graph.optimize();
         }
         self.revisited = self.tied_submaps(recent);
         self.local_map.take();
-        has_moved
+        has_closed || has_seen_again
     }
 
     /// Finishes the last submap, and registers each scan on what was seen at its place at other times. Returns whether

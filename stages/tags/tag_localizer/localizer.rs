@@ -57,6 +57,19 @@ struct TagReading {
     stddev: f64,
 }
 
+/// Standard deviation of the position at which a tag is seen, metres ahead of the robot and to its left, by its
+/// covariance, or where that is zero or not finite by `share` of the distance, of at least a metre. `None` if the position
+/// is not finite, or farther away than any tag is seen.
+pub fn sighting_deviation(place: &Vector2<f64>, covariance: &Matrix2<f64>, share: f64) -> Option<f64> {
+    let distance = place.norm();
+    let known = largest_variance(covariance).sqrt();
+    let deviation = match known.is_finite() && known > 0.0 {
+        true => known.max(LEAST_SIGHTING_STDDEV),
+        false => share * distance.max(1.0),
+    };
+    (distance.is_finite() && distance < FARTHEST).then_some(deviation)
+}
+
 /// Why a reading is left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ReadingProblem {
@@ -161,15 +174,8 @@ impl TagLocalizer {
         if tag_id.is_empty() {
             return Err(ReadingProblem::NoId);
         }
-        let distance = place.norm();
-        if !(distance.is_finite() && distance < FARTHEST) {
-            return Err(ReadingProblem::NoPosition);
-        }
-        let known = largest_variance(covariance).sqrt();
-        let stddev = match known.is_finite() && known > 0.0 {
-            true => known.max(LEAST_SIGHTING_STDDEV),
-            false => self.parameters.sighting_stddev * distance.max(1.0),
-        };
+        let stddev = sighting_deviation(&place, covariance, self.parameters.sighting_stddev)
+            .ok_or(ReadingProblem::NoPosition)?;
         self.place_or_wait(TagReading { time, tag_id: tag_id.to_owned(), measured: Measured::Place(place), stddev })
     }
 

@@ -41,7 +41,7 @@ mod tag;
 
 pub use bearing_groups::{Bearing, BearingGroups};
 pub use likelihood::Likelihood;
-pub use localizer::{ReadingProblem, TagLocalizer};
+pub use localizer::{ReadingProblem, TagLocalizer, sighting_deviation};
 pub use parameters::{Readout, TagLocalizerParameters};
 pub use pose_covariance::{CovarianceProblem, heading_variance, largest_variance, position_covariance};
 pub use pose_track::{NoPose, PoseTrack, Position};
