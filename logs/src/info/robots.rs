@@ -5,7 +5,8 @@ mod problems;
 use crate::one_map::OneMap;
 use crate::robots::{
     CellValues, Classified, InferredPoses, MapOrigin, MergedMaps, Peculiarity, PoseSource, RobotChannels, Role,
-    TagRanges, TagReader, doubtful, is_scan, left_out, peculiarities, pose_with_covariance, unread_map,
+    TagRanges, TagReader, doubtful, is_scan, left_out, peculiarities, pose_with_covariance, robots_with_unread_maps,
+    unread_map,
 };
 use crate::schemas::full_type_name;
 use crate::tf::{TfPoses, is_static};
@@ -62,6 +63,8 @@ pub(super) struct RobotSurvey {
     other_scans: BTreeSet<String>,
     /// What is said of maps of types that are not read.
     unread_maps: BTreeSet<String>,
+    /// By robot beside others: what is said of its maps, which are all of types that are not read.
+    with_unread_maps: BTreeMap<String, String>,
     /// By robot: what is wrong with the first map that cannot be used, and how many such maps there are.
     unusable_maps: BTreeMap<String, (GridError, u64)>,
     merged_maps: MergedMaps,
@@ -88,9 +91,10 @@ pub(super) struct RobotSurvey {
 
 impl RobotSurvey {
     /// Creates a survey of logs with these channels.
-    pub(super) fn new<'a>(topics: RobotTopics, channels: impl Iterator<Item = &'a Channel>) -> Self {
-        let roles = RobotChannels::new(topics.clone(), channels);
+    pub(super) fn new<'a>(topics: RobotTopics, channels: impl Iterator<Item = &'a Channel> + Clone) -> Self {
+        let roles = RobotChannels::new(topics.clone(), channels.clone());
         Self {
+            with_unread_maps: robots_with_unread_maps(channels, &roles, &topics.map),
             inferred: InferredPoses::new(&roles),
             odometry: BTreeMap::new(),
             tag_readers: BTreeMap::new(),

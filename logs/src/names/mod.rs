@@ -6,20 +6,25 @@
 //! robots are on `/tf` and `/tf_static`, where programs expect them.
 //!
 //! The robot is given by the user ([`Input`]), or by the file name where several logs have equal topics, or by a topic
-//! such as `/robot1/tf`, which contains the frames of `robot1`.
+//! such as `/robot1/tf`, which contains the frames of `robot1`, or by frames: those of the maps on `/map`, or of lidars on
+//! one base.
 
 mod channel;
 mod clock;
 mod error;
 mod file_names;
+mod first_frames;
 mod infer_robots;
 mod input;
+mod lidars_of_one;
 mod logged_name;
+mod map_frame_robot;
 mod naming;
 mod rename;
 mod rename_advice;
 mod rules;
 mod shared_frames;
+mod shown_robots;
 
 #[cfg(test)]
 mod tests;
@@ -64,8 +69,8 @@ pub fn open(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result
         files.into_iter().map(|file| LogFile::open_as(file, rules.thresholds)).collect::<Result<_, _>>()?;
     clock::align(&mut files, &input_of, rules.align_start);
     let inputs = name_maps(&files, &input_of, inputs)?;
-    let mut names = naming::name(&files, &input_of, &inputs, rules, robots)?;
     let files: Arc<[LogFile]> = files.into();
+    let mut names = naming::name(&files, &input_of, &inputs, rules, robots)?;
     if rules.convention == Convention::ByRobot {
         names.share_frames(&files, robots);
     }
@@ -90,8 +95,14 @@ impl Names {
     }
 
     /// All named channels.
-    pub fn channels(&self) -> impl Iterator<Item = &Channel> {
+    pub fn channels(&self) -> impl Iterator<Item = &Channel> + Clone {
         self.channels.iter().flat_map(BTreeMap::values).map(|named| &named.channel)
+    }
+
+    /// The named channels that the rules select.
+    pub(crate) fn wanted_channels(&self) -> impl Iterator<Item = &Channel> + Clone {
+        let wanted = self.channels.iter().flat_map(BTreeMap::values).filter(|named| named.is_wanted);
+        wanted.map(|named| &named.channel)
     }
 
     /// Whether the rules select a channel.

@@ -2,8 +2,11 @@
 
 use super::channel::{NamedChannel, Recoders};
 use super::infer_robots::infer_robots;
+use super::lidars_of_one::NumberedChannel;
 use super::logged_name::LoggedName;
+use super::map_frame_robot::nameless_map;
 use super::rules::fits;
+use super::shown_robots::ShownRobots;
 use super::{Convention, Input, NameError, NameRules, Names};
 use crate::reader::LogFile;
 use crate::robots::{RobotChannels, Role};
@@ -11,6 +14,7 @@ use crate::tf::{is_static, tf_topic};
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::stage::RobotTopics;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// A channel that is being named.
 struct Draft {
@@ -38,13 +42,26 @@ impl Draft {
 
 /// Names the channels of `files`, where `input_of` is the index of the input that each file belongs to.
 pub(super) fn name(
-    files: &[LogFile],
+    files: &Arc<[LogFile]>,
     input_of: &[usize],
     inputs: &[Input],
     rules: &NameRules,
     robots: &RobotTopics,
 ) -> Result<Names, NameError> {
     let mut drafts: Vec<Draft> = drafts(files, rules);
+    let shown = match rules.convention {
+        Convention::AsLogged => ShownRobots::default(),
+        Convention::ByRobot => {
+            let mut channels: Vec<Vec<NumberedChannel<'_>>> = vec![Vec::new(); inputs.len()];
+            for Draft { file, number, channel, .. } in &drafts {
+                if let Some(of_input) = input_of.get(*file).and_then(|&input| channels.get_mut(input)) {
+                    of_input.push(((*file, *number), channel));
+                }
+            }
+            ShownRobots::find(files, input_of, inputs, &channels, &rules.robots, robots)
+        }
+    };
+    name_maps(&mut drafts, input_of, &shown, robots);
     let mut of_inputs: Vec<Vec<&Channel>> = vec![Vec::new(); inputs.len()];
     for Draft { file, channel, .. } in &drafts {
         if let Some(of_input) = input_of.get(*file).and_then(|&input| of_inputs.get_mut(input)) {
@@ -53,7 +70,7 @@ pub(super) fn name(
     }
     let (of_input, note) = match rules.convention {
         Convention::AsLogged => (inputs.iter().map(|input| input.robot.clone()).collect(), None),
-        Convention::ByRobot => infer_robots(inputs, &of_inputs, robots)?,
+        Convention::ByRobot => infer_robots(inputs, &of_inputs, robots, &shown)?,
     };
     let logged_names: Vec<LoggedName> =
         inputs.iter().zip(&of_inputs).map(|(input, channels)| LoggedName::of(input, channels, rules, robots)).collect();
@@ -119,6 +136,17 @@ fn drafts(files: &[LogFile], rules: &NameRules) -> Vec<Draft> {
         channels.map(|(number, channel)| draft(file, number, channel)).collect::<Vec<_>>()
     };
     files.iter().enumerate().flat_map(of_file).collect()
+}
+
+/// Puts maps, and their updates, on a topic without a robot's name on that of the robot that their frame shows.
+fn name_maps(drafts: &mut [Draft], input_of: &[usize], shown: &ShownRobots, robots: &RobotTopics) {
+    let Some(nameless) = nameless_map(robots) else { return };
+    for Draft { file, channel, .. } in drafts {
+        let Some(robot) = input_of.get(*file).and_then(|&input| shown.of_map(input)) else { continue };
+        if let Some(rest @ ("" | "_updates")) = channel.topic.strip_prefix(&nameless) {
+            channel.topic = format!("{}{rest}", robots.map.replace("{robot}", robot));
+        }
+    }
 }
 
 /// Puts topics and frames under the robots of their files or namespaces.

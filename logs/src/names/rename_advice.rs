@@ -1,17 +1,15 @@
 //! Advice on `--rename` for maps and scans whose topics do not fit the pattern of the pipeline.
 
 use super::TopicRename;
-use crate::robots::is_merger;
+use crate::robots::{PLACES, is_merger};
 use gridweave_runtime::stage::match_robot;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The placeholder for the name of a robot in a topic.
 const ROBOT: &str = "{robot}";
-/// Parts of topics that say where on a robot a sensor is.
-const PLACES: [&str; 8] = ["front", "rear", "back", "left", "right", "top", "upper", "lower"];
 
 /// First parts of topics that name a program, and no robot.
-const PROGRAMS: [&str; 10] = [
+pub(super) const PROGRAMS: [&str; 10] = [
     "cartographer",
     "hdl_graph_slam",
     "map_merge",

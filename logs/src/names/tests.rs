@@ -5,6 +5,8 @@ use gridweave_runtime::ros::{
     Header, OccupancyGrid, PoseWithCovarianceStamped, RosMessage, TFMessage, TransformStamped, decode, encode,
 };
 
+mod shown_robots;
+
 const SCAN: &str = "sensor_msgs/msg/LaserScan";
 
 /// Writes a log with a channel for each topic and type.

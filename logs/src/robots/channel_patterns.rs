@@ -1,8 +1,9 @@
 //! The role of a channel by its topic and its message type alone.
 
 use super::driver_topics::DriverTopics;
+use super::part_names::is_sensor;
 use super::role::{Classified, PoseSource, Role};
-use super::scan_topics::{ScanTopics, is_sensor};
+use super::scan_topics::ScanTopics;
 use super::tag_reader::{TagReader, known_fields};
 use crate::robot_name::fits;
 use crate::schemas::full_type_name;
@@ -31,6 +32,12 @@ const ODOMETRY: [&str; 12] = [
     "husky_velocity_controller/odom",
     "jackal_velocity_controller/odom",
 ];
+
+/// Whether a channel has odometry on a usual topic without a robot's name, such as `/odom`.
+pub(crate) fn is_nameless_odometry(channel: &Channel) -> bool {
+    full_type_name(&channel.schema_name) == Odometry::NAME
+        && channel.topic.strip_prefix('/').is_some_and(|name| ODOMETRY.contains(&name))
+}
 
 /// The topics of robots: those that the pipeline names, and those that drivers and localizers use by default.
 #[derive(Clone, Debug)]

@@ -106,6 +106,11 @@ impl RobotChannels {
         self.patterns.lidar_note(channel)
     }
 
+    /// The robot in whose namespace a topic is, known or not.
+    pub(crate) fn namespace<'a>(&self, topic: &'a str) -> Option<&'a str> {
+        self.patterns.namespace(topic)
+    }
+
     /// Robots with maps, sorted by name.
     pub(crate) fn mapped(&self) -> impl Iterator<Item = &str> + Clone {
         self.robots(|data| data.has_maps)

@@ -1,11 +1,8 @@
 //! Messages of several robots on one topic, which their frames alone tell apart.
 
 use super::merged_maps::own;
-use super::scan_topics::is_sensor;
+use super::part_names::is_part;
 use std::collections::BTreeMap;
-
-/// Words in the names of frames that say where on a robot a sensor is.
-const PLACES: [&str; 8] = ["front", "rear", "back", "left", "right", "top", "upper", "lower"];
 
 /// The first frame of each topic of one robot.
 #[derive(Clone, Debug, Default)]
@@ -38,7 +35,6 @@ pub(crate) fn problem_of_frames<'a>(topic: &str, frames: impl Iterator<Item = &'
 /// `robot2/laser`. One robot may have two lidars, `front/laser` and `rear/laser`.
 fn problem(topic: &str, frames: [&str; 2]) -> Option<String> {
     let [(one, of_one), (other, of_other)] = [frames[0].split_once('/')?, frames[1].split_once('/')?];
-    let is_part = |name: &str| is_sensor(name) || name.split(['_', '-']).any(|word| PLACES.contains(&word));
     (one != other && of_one == of_other && !is_part(one) && !is_part(other)).then(|| {
         let name = topic.rsplit('/').next().unwrap_or_default();
         format!(

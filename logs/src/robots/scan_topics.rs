@@ -1,6 +1,7 @@
 //! The topics on which the lidars of robots publish.
 
 use super::driver_topics::DriverTopics;
+use super::part_names::is_sensor;
 use super::scans::is_scan;
 use crate::schemas::full_type_name;
 use gridweave_runtime::message::Channel;
@@ -102,29 +103,6 @@ impl ScanTopics {
         let by_driver = || self.drivers.iter().find_map(|topics| topics.robot(&channel.topic));
         match_robot(&self.pattern, &channel.topic).or_else(by_driver)
     }
-}
-
-/// Whether a name is that of a sensor, as in `/front_camera/points`, and not of a robot.
-pub(super) fn is_sensor(name: &str) -> bool {
-    const SENSORS: [&str; 16] = [
-        "cam",
-        "camera",
-        "depth",
-        "stereo",
-        "rgbd",
-        "realsense",
-        "kinect",
-        "zed",
-        "oak",
-        "sensor",
-        "lidar",
-        "laser",
-        "velodyne",
-        "ouster",
-        "livox",
-        "hesai",
-    ];
-    name.to_lowercase().split(|letter: char| !letter.is_alphabetic()).any(|word| SENSORS.contains(&word))
 }
 
 #[cfg(test)]

@@ -112,7 +112,7 @@ impl ChannelRouter {
     ) -> Result<(), StageError> {
         self.pass(index, stamp, data, output)?;
         let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
-        if matches!(route.role, Role::Scan | Role::Odometry)
+        if matches!(route.role, Role::Scan | Role::Odometry | Role::Map)
             && self.merged_maps.is_some()
             && let Ok(Header { frame_id, .. }) = decode(data)
             && let Some(mixed) = self.mixed_frames.add(&route.channel.topic, &route.robot, &frame_id)

@@ -185,7 +185,8 @@ impl Outputs for RobotMessages {
             localised: ports.output_on(
                 "/{robot}/localised",
                 "localised",
-                "from a log: robots that have nothing to be merged, as they localise in one map, which is no robot's",
+                "from a log: robots that have nothing to be merged, as they localise in one map, which is no robot's, or as \
+                 their maps are of a type that is not read",
             ),
         }
     }

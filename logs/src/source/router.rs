@@ -9,10 +9,10 @@ use crate::names::{Names, Renamed};
 use crate::one_map::OneMap;
 use crate::reader::{Damage, LogFile, LogMessage};
 use crate::reader::{SupplementKind, describes_its_file, read_attachment, read_metadata};
-use crate::robots::Role;
+use crate::robots::{Role, robots_with_unread_maps};
 use gridweave_runtime::ros::UnmergedRobot;
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// The target of a channel's messages.
@@ -36,6 +36,8 @@ pub(crate) struct Router {
     has_sent_supplements: bool,
     /// The robots that localise in one map; `None` once they are sent.
     one_map: Option<OneMap>,
+    /// Robots whose maps are all of types that are not read, and what is said of them; empty once they are sent.
+    with_unread_maps: BTreeMap<String, String>,
 }
 
 impl Router {
@@ -49,12 +51,18 @@ impl Router {
         reading: RobotReading,
     ) -> Self {
         let one_map = updates_maps.then(|| OneMap::read(&files, &names, &robots)).flatten();
+        let pattern = robots.map.clone();
         let mut channels = ChannelRouter::new(robots, names.channels(), updates_maps, reading);
         channels.set_given_robots(names.given_robots());
         if updates_maps {
             learn_ahead(&files, &names, &mut channels);
         }
+        let with_unread_maps = match updates_maps {
+            true => robots_with_unread_maps(names.wanted_channels(), channels.roles(), &pattern),
+            false => BTreeMap::new(),
+        };
         Self {
+            with_unread_maps,
             channels,
             names,
             renamed: Vec::new(),
@@ -111,8 +119,14 @@ impl Router {
         Ok(())
     }
 
-    /// Sends the robots that localise in one map, once.
-    pub(crate) fn send_localised(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
+    /// Sends the robots of which nothing is merged, once: they localise in one map, or their maps are not read.
+    pub(crate) fn send_unmerged(&mut self, output: &Output<RobotMessages>) -> Result<(), StageError> {
+        for (robot, reason) in std::mem::take(&mut self.with_unread_maps) {
+            if !output.localised.is_read() {
+                output.warn(format!("there is no map of {robot}: {reason}"));
+            }
+            output.localised.send(&robot, &UnmergedRobot { robot: robot.clone(), reason })?;
+        }
         let Some(one_map) = self.one_map.take() else { return Ok(()) };
         let reason = self.channels.learn_one_map(&one_map);
         one_map.note().into_iter().for_each(|note| output.warn(note));

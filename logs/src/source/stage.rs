@@ -125,7 +125,7 @@ impl Source for McapSource {
             send_latched(&mut self.latched, self.window.start, &mut self.router, output)?;
             output.set_log_time(message.log_time);
             self.router.send_supplements(output)?;
-            self.router.send_localised(output)?;
+            self.router.send_unmerged(output)?;
             self.router.send(&message, output)?;
         }
         self.warn_of_damage(output);

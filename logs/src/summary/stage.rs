@@ -36,7 +36,7 @@ pub fn kind() -> StageKind {
     .optional_inputs("deformation", "the deformations of the maps", SummarySink::deformation)
     .optional_inputs(
         "localised",
-        "robots that have nothing to be merged, as they localise in one map; listed even if no robot has a map frame",
+        "robots that have nothing to be merged, with the reason; listed even if no robot has a map frame",
         SummarySink::localised,
     )
     .finish(SummarySink::write)

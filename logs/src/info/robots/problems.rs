@@ -24,6 +24,7 @@ impl RobotSurvey {
             .chain(self.shared_map())
             .chain(self.map_topic_problem(&map_advice))
             .chain(self.unread_maps.iter().filter(|_| self.has_no_map()).cloned())
+            .chain(self.with_unread_maps.iter().map(|(robot, said)| format!("there is no map of {robot}: {said}")))
             .chain(self.scan_topic_problem())
             .chain(self.lone_robot().filter(|_| map_advice.is_empty()))
             .chain(self.missing_messages(&missing_poses))
@@ -105,7 +106,9 @@ impl RobotSurvey {
     /// The robot that is the only one.
     fn lone_robot(&self) -> Option<String> {
         match self.robots.keys().collect::<Vec<_>>()[..] {
-            [robot] => Some(format!("there is one robot only, {robot}: merge the log with that of another robot")),
+            [robot] if self.with_unread_maps.is_empty() => {
+                Some(format!("there is one robot only, {robot}: merge the log with that of another robot"))
+            }
             _ => None,
         }
     }
@@ -119,13 +122,16 @@ impl RobotSurvey {
 
     /// The robots without maps, poses or tag readings, unless another problem is the reason.
     fn missing_messages(&self, missing_poses: &BTreeMap<String, String>) -> impl Iterator<Item = String> {
-        let in_one_map = |robot: &str| self.one_map.as_ref().is_some_and(|one_map| one_map.robots.contains(robot));
+        let is_explained = |robot: &str| {
+            self.with_unread_maps.contains_key(robot)
+                || self.one_map.as_ref().is_some_and(|one_map| one_map.robots.contains(robot))
+        };
         let lacking = |what: &str, lacks: &dyn Fn(&str, &RobotInfo) -> bool| {
             let names = self.robots.iter().filter(|(name, robot)| lacks(name, robot)).map(|(name, _)| name.as_str());
             let names = names.collect::<Vec<_>>().join(", ");
             (!names.is_empty()).then(|| format!("there is no {what} of {names}"))
         };
-        let maps = lacking("map", &|name, robot| robot.maps + robot.scans == 0 && !in_one_map(name));
+        let maps = lacking("map", &|name, robot| robot.maps + robot.scans == 0 && !is_explained(name));
         let poses = lacking("pose", &|name, robot| robot.poses == 0 && !missing_poses.contains_key(name));
         let readings = lacking("tag reading", &|_, robot| robot.readings == 0);
         [maps.filter(|_| !self.has_no_map()), poses, readings].into_iter().flatten()
