@@ -6,7 +6,7 @@
 //! not name itself.
 
 use super::first_frames::FirstFrames;
-use crate::robots::{BASES, RobotChannels, Role, is_nameless_odometry, is_part, is_scan};
+use crate::robots::{BASES, RobotChannels, Role, is_lidar_topic, is_nameless_odometry, is_part, is_scan};
 use crate::schemas::full_type_name;
 use crate::tf::tf_topic;
 use gridweave_runtime::message::Channel;
@@ -57,6 +57,14 @@ impl<'a> Lidars<'a> {
         }
         let is_given = given.iter().any(|robot| lidars.namespaces.contains(robot.as_str()));
         (!lidars.namespaces.is_empty() && !is_given).then_some(lidars)
+    }
+
+    /// The topic of the lidar that is read, and those of the others, if none is on a topic that lidars usually have.
+    pub(super) fn chosen(&self) -> Option<(String, Vec<String>)> {
+        let is_usual = |topic: &str| is_lidar_topic(topic) || topic.matches('/').count() == 1;
+        let mut topics = self.scans.keys().map(|topic| (*topic).to_owned());
+        let first = topics.next().filter(|_| !self.scans.keys().any(|topic| is_usual(topic)))?;
+        Some((first, topics.collect()))
     }
 
     /// The channels with the scans.

@@ -9,7 +9,7 @@ use super::rules::fits;
 use super::shown_robots::ShownRobots;
 use super::{Convention, Input, NameError, NameRules, Names};
 use crate::reader::LogFile;
-use crate::robots::{RobotChannels, Role};
+use crate::robots::{RobotChannels, Role, robots_with_unread_maps};
 use crate::tf::{is_static, tf_topic};
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::stage::RobotTopics;
@@ -61,7 +61,7 @@ pub(super) fn name(
             ShownRobots::find(files, input_of, inputs, &channels, &rules.robots, robots)
         }
     };
-    name_maps(&mut drafts, input_of, &shown, robots);
+    name_by_frames(&mut drafts, input_of, &shown, robots);
     let mut of_inputs: Vec<Vec<&Channel>> = vec![Vec::new(); inputs.len()];
     for Draft { file, channel, .. } in &drafts {
         if let Some(of_input) = input_of.get(*file).and_then(|&input| of_inputs.get_mut(input)) {
@@ -87,7 +87,8 @@ pub(super) fn name(
     if rules.convention == Convention::ByRobot {
         check_robots(&drafts, &roles, files, input_of, inputs)?;
     }
-    let known = known_robots(&roles, &drafts);
+    let mut known = known_robots(&roles, &drafts);
+    known.extend(robots_with_unread_maps(drafts.iter().map(|draft| &draft.channel), &roles, &robots.map).into_keys());
     if let Some(unknown) = rules.robots.iter().find(|robot| !known.contains(robot.as_str())) {
         return Err(NameError::NoSuchRobot { robot: unknown.clone(), known: known.into_iter().collect() });
     }
@@ -138,12 +139,18 @@ fn drafts(files: &[LogFile], rules: &NameRules) -> Vec<Draft> {
     files.iter().enumerate().flat_map(of_file).collect()
 }
 
-/// Puts maps, and their updates, on a topic without a robot's name on that of the robot that their frame shows.
-fn name_maps(drafts: &mut [Draft], input_of: &[usize], shown: &ShownRobots, robots: &RobotTopics) {
-    let Some(nameless) = nameless_map(robots) else { return };
+/// Puts maps, and their updates, on a topic without a robot's name on that of the robot that their frame shows, and the
+/// scans that are read of a robot with several lidars on the topic that the pipeline names, without its name.
+fn name_by_frames(drafts: &mut [Draft], input_of: &[usize], shown: &ShownRobots, robots: &RobotTopics) {
+    let scan = robots.scan.replace("/{robot}", "");
+    let nameless = nameless_map(robots);
     for Draft { file, channel, .. } in drafts {
-        let Some(robot) = input_of.get(*file).and_then(|&input| shown.of_map(input)) else { continue };
-        if let Some(rest @ ("" | "_updates")) = channel.topic.strip_prefix(&nameless) {
+        let Some(&input) = input_of.get(*file) else { continue };
+        if shown.scans(input) == Some(&*channel.topic) {
+            channel.topic.clone_from(&scan);
+        }
+        let (Some(robot), Some(nameless)) = (shown.of_map(input), &nameless) else { continue };
+        if let Some(rest @ ("" | "_updates")) = channel.topic.strip_prefix(nameless.as_str()) {
             channel.topic = format!("{}{rest}", robots.map.replace("{robot}", robot));
         }
     }

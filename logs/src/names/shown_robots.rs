@@ -29,11 +29,13 @@ pub(super) struct ShownRobots {
     only: BTreeMap<usize, ShownRobot>,
     /// The robot of the maps on a topic without a robot's name, in a log with other robots.
     of_map: BTreeMap<usize, String>,
+    /// The topic of the scans that are read, of a robot none of whose lidars has a usual topic.
+    scans: BTreeMap<usize, String>,
     notes: Vec<String>,
 }
 
 impl ShownRobots {
-    /// Looks for robots in the logs to which the user has given no name. `channels` are those of each input, and `given`
+    /// Looks for robots in logs; of those that the user has named, only for the lidar that is read. `channels` are those of each input, and `given`
     /// the robots that are to be read. Only logs that have such lidars or maps are read, and only their beginnings.
     pub(super) fn find(
         files: &Arc<[LogFile]>,
@@ -49,13 +51,14 @@ impl ShownRobots {
             .map(|of| RobotChannels::new(robots.clone(), of.iter().map(|(_, channel)| *channel)))
             .collect();
         let unnamed = || (0..inputs.len()).filter(|input| inputs[*input].robot.is_none());
-        let lidars: BTreeMap<usize, Lidars<'_>> =
-            unnamed().filter_map(|input| Some((input, Lidars::of(&channels[input], &roles[input], given)?))).collect();
+        let lidars: BTreeMap<usize, Lidars<'_>> = (0..inputs.len())
+            .filter_map(|input| Some((input, Lidars::of(&channels[input], &roles[input], given)?)))
+            .collect();
         let is_map = |channel: &Channel| map_topic.as_ref().is_some_and(|topic| is_map_on(channel, topic));
         let mapped: BTreeSet<usize> =
             unnamed().filter(|input| channels[*input].iter().any(|(_, channel)| is_map(channel))).collect();
         let mut wanted: BTreeMap<(usize, u16), Holds> = BTreeMap::new();
-        for input in unnamed().filter(|input| lidars.contains_key(input) || mapped.contains(input)) {
+        for input in (0..inputs.len()).filter(|input| lidars.contains_key(input) || mapped.contains(input)) {
             wanted
                 .extend(lidars.get(&input).into_iter().flat_map(Lidars::channels).map(|scans| (scans, Holds::Header)));
             for (number, channel) in &channels[input] {
@@ -73,6 +76,9 @@ impl ShownRobots {
         let mut shown = Self::default();
         for (input, frames) in &frames {
             if let Some(one) = lidars.get(input).and_then(|lidars| lidars.of_one_robot(frames)) {
+                if let Some((read, others)) = lidars.get(input).and_then(Lidars::chosen) {
+                    shown.choose_scans(*input, read, &others, robots);
+                }
                 let otherwise = format!(", and {} takes each lidar for a robot", one.option);
                 shown.only.insert(*input, ShownRobot { name: one.name, sentence: one.sentence, otherwise });
             } else if let Some(topic) = map_topic.as_ref().filter(|_| mapped.contains(input)) {
@@ -87,6 +93,14 @@ impl ShownRobots {
         let all: Vec<BTreeSet<String>> = (0..inputs.len()).map(named).collect();
         shown.drop_taken(&all);
         shown
+    }
+
+    fn choose_scans(&mut self, input: usize, read: String, others: &[String], robots: &RobotTopics) {
+        let nameless = robots.scan.replace("/{robot}", "");
+        let other =
+            others.first().map_or_else(String::new, |other| format!("; `--rename {other}={nameless}` reads another"));
+        self.notes.push(format!("the scans on {read} are read, as those on `{nameless}`{other}"));
+        self.scans.insert(input, read);
     }
 
     fn add_map(&mut self, input: usize, owner: Option<MapOwner>, topic: &str, robots: &RobotTopics) {
@@ -135,6 +149,11 @@ impl ShownRobots {
     /// The robot of the maps on a topic without a robot's name, in an input with other robots.
     pub(super) fn of_map(&self, input: usize) -> Option<&str> {
         self.of_map.get(&input).map(String::as_str)
+    }
+
+    /// The topic of the scans that are read as those on the topic that the pipeline names.
+    pub(super) fn scans(&self, input: usize) -> Option<&str> {
+        self.scans.get(&input).map(String::as_str)
     }
 
     /// Notes for the user.

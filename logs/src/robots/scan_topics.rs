@@ -47,6 +47,11 @@ const LIDAR_CLOUDS: [&str; 12] = [
     "cloud",
 ];
 
+/// Whether a topic without a robot's name is one on which lidars publish.
+pub(crate) fn is_lidar_topic(topic: &str) -> bool {
+    topic.strip_prefix('/').is_some_and(|name| LIDAR_SCANS.contains(&name) || LIDAR_CLOUDS.contains(&name))
+}
+
 /// The topics with the scans of robots: the one that the pipeline names, of scans or point clouds; for a robot that has
 /// none, the first of [`LIDAR_SCANS`], or else of [`LIDAR_CLOUDS`].
 #[derive(Clone, Debug, Default)]

@@ -23,7 +23,7 @@ pub(crate) fn unit_of_map(info: &MapMetaData) -> Option<String> {
     (side >= 1.0 && width.max(height) >= LARGE).then(|| {
         format!(
             "cells of {side} m make a map of {width:.0} m by {height:.0} m: if its resolution is in {unit}, publish it in metres \
-             ({metres}); a map file is read so with --resolution ROBOT={metres}"
+             ({metres}); it is read so with --resolution ROBOT={metres}"
         )
     })
 }

@@ -8,12 +8,14 @@ use super::latched::Latch;
 use super::{RobotMessages, RobotReading};
 use crate::one_map::OneMap;
 use crate::robots::{
-    CellValues, MapOrigin, MergedMaps, MixedFrames, Peculiarity, RobotChannels, Role, doubtful, left_out, peculiarities,
+    CellValues, MapOrigin, MergedMaps, MixedFrames, Peculiarity, Resolutions, RobotChannels, Role, doubtful, left_out,
+    peculiarities, with_resolution,
 };
 use crate::tf::{MAP_FRAMES, is_static, tf_topic};
 use gridweave_runtime::message::{Channel, FixedText, MessageHeader};
 use gridweave_runtime::ros::{Header, TFMessage, TagRange, decode};
 use gridweave_runtime::stage::{Output, RobotTopics, StageError, frame_of_robot};
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The number of messages on a topic of transforms in which frames are looked for: later ones repeat them.
@@ -25,6 +27,7 @@ pub(super) struct ChannelRouter {
     roles: RobotChannels,
     /// How the values of maps' cells are read.
     map_values: CellValues,
+    resolutions: Resolutions,
     /// `None` if every map is taken as the robot's of its topic.
     merged_maps: Option<MergedMaps>,
     /// The last map of each route whose origin is undecided: none live, where other maps may never be published.
@@ -58,6 +61,7 @@ impl ChannelRouter {
             roles,
             robots,
             map_values: reading.map_values,
+            resolutions: reading.resolutions,
             merged_maps: updates_maps.then(MergedMaps::default),
             undecided: Vec::new(),
             holds_undecided: true,
@@ -102,6 +106,14 @@ impl ChannelRouter {
         self.routes.get(index)
     }
 
+    /// A message on a route; a map with the resolution that the user has set.
+    fn corrected<'a>(&self, index: usize, data: &'a [u8]) -> Cow<'a, [u8]> {
+        match self.routes.get(index).filter(|route| route.role == Role::Map) {
+            Some(route) => with_resolution(&self.resolutions, &route.robot, data),
+            None => Cow::Borrowed(data),
+        }
+    }
+
     /// Sends a message that was received on a route. The output's log time must be the message's.
     pub(super) fn send(
         &mut self,
@@ -110,6 +122,7 @@ impl ChannelRouter {
         data: &[u8],
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
+        let data = &*self.corrected(index, data);
         self.pass(index, stamp, data, output)?;
         let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
         if matches!(route.role, Role::Scan | Role::Odometry | Role::Map)
@@ -143,6 +156,7 @@ impl ChannelRouter {
 
     /// Learns frames and maps from a message without sending anything.
     pub(super) fn learn(&mut self, index: usize, data: &[u8], output: &Output<RobotMessages>) {
+        let data = &*self.corrected(index, data);
         if let Some(route) = self.routes.get(index) {
             self.derived.learn(route, &self.roles, data, output);
         }
@@ -209,6 +223,7 @@ impl ChannelRouter {
         data: &[u8],
         output: &Output<RobotMessages>,
     ) -> Result<(), StageError> {
+        let data = &*self.corrected(index, data);
         self.pass(index, stamp, data, output)?;
         let Some(route) = self.routes.get_mut(index) else { return Ok(()) };
         self.derived.send_of_learnt(route, data, output)

@@ -16,12 +16,13 @@ pub mod topology_file;
 #[cfg(test)]
 mod tests;
 
-pub use crate::robots::{CellValues, LidarPoses};
+pub use crate::robots::{CellValues, LidarPoses, Resolutions};
 pub use live_router::{LiveMessage, LiveRouter};
 pub use stage::McapSource;
 
 use crate::map_file::Thresholds;
 use crate::names::{Convention, Input, NameRules};
+use crate::robots::problem_of_resolutions;
 use gridweave_runtime::ros::{
     OccupancyGrid, PoseWithCovarianceStamped, RangeScan, TagBearing, TagPosition, TagRange, TopologicalMap,
     UnmergedRobot,
@@ -57,6 +58,9 @@ pub struct SourceParameters {
     /// write them (`occupancy`), as costmaps with costs around obstacles (`costmap`), or as two classes whatever their
     /// values (`two_classes`). Maps of another convention are sent as map servers write them.
     pub map_values: CellValues,
+    /// Side of a cell of a robot's maps, metres, instead of the resolution in the messages. The position of the origin
+    /// stays, as do poses and tags in the map. Set by `--resolution` on the command line.
+    pub resolutions: Resolutions,
     /// The poses of lidars on the bases of their robots, as `{ ROBOT = [X, Y, YAW] }`, metres and radians, in place of
     /// those in tf. A fourth number is the roll: pi for a lidar that is mounted upside down.
     pub lidars: LidarPoses,
@@ -73,6 +77,8 @@ pub struct SourceParameters {
 pub struct RobotReading {
     /// How the values of maps' cells are read.
     pub map_values: CellValues,
+    /// The resolutions of maps; those of other robots are in the messages.
+    pub resolutions: Resolutions,
     /// The poses of lidars on their robots; those of others are taken from tf.
     pub lidars: LidarPoses,
 }
@@ -103,6 +109,9 @@ impl Parameters for SourceParameters {
         }
         if self.end.is_some_and(|end| end <= self.start) {
             errors.push(ParameterError::new("end", "must be later than `start`"));
+        }
+        if let Some(wrong) = problem_of_resolutions(&self.resolutions) {
+            errors.push(ParameterError::new("resolutions", wrong));
         }
         let is_place = |pose: &Vec<f64>| {
             let is_angle = |angle: &f64| angle.abs() <= InitialPose::FULL_TURN;

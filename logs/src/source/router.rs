@@ -78,6 +78,11 @@ impl Router {
         self.channels.roles().scanned()
     }
 
+    /// Robots with maps, sorted by name.
+    pub(crate) fn mapped(&self) -> impl Iterator<Item = &str> {
+        self.channels.roles().mapped()
+    }
+
     /// Sends a message. The output's log time must be the message's.
     pub(crate) fn send(&mut self, message: &LogMessage<'_>, output: &Output<RobotMessages>) -> Result<(), StageError> {
         let Some(route) = self.route(message, output)? else { return Ok(()) };

@@ -51,7 +51,8 @@ impl McapSource {
         // What keeps the names of the log keeps its bytes.
         let map_values = if names_robots { parameters.map_values } else { CellValues::Occupancy };
         let given: Vec<String> = parameters.lidars.keys().cloned().collect();
-        let reading = RobotReading { map_values, lidars: parameters.lidars };
+        let resized: Vec<String> = parameters.resolutions.keys().cloned().collect();
+        let reading = RobotReading { map_values, resolutions: parameters.resolutions, lidars: parameters.lidars };
         let router = Router::new(context.robots.clone(), names, reader.files().clone(), names_robots, reading);
         if let Some(robot) = given.iter().find(|robot| !router.scanned().any(|scanned| scanned == *robot)) {
             let scanned: Vec<&str> = router.scanned().collect();
@@ -60,6 +61,15 @@ impl McapSource {
                 false => format!("maps are built from the scans of {}", scanned.join(", ")),
             };
             let error = format!("`lidars` names `{robot}`, of whose scans no map is built");
+            return Err(StageError::new(doing, error).with_help(help));
+        }
+        if let Some(robot) = resized.iter().find(|robot| !router.mapped().any(|mapped| mapped == *robot)) {
+            let mapped: Vec<&str> = router.mapped().collect();
+            let help = match mapped.is_empty() {
+                true => "no robot has a map in these logs".to_owned(),
+                false => format!("there are maps of {}", mapped.join(", ")),
+            };
+            let error = format!("`resolutions` names `{robot}`, which has no map");
             return Err(StageError::new(doing, error).with_help(help));
         }
         Ok(Self {

@@ -75,7 +75,8 @@ impl RosSource {
         let duration = |seconds| Duration::try_from_secs_f64(seconds).unwrap_or_default();
         let inbox = Arc::new(Inbox::default());
         let events = Arc::clone(&inbox);
-        let reading = RobotReading { map_values: parameters.map_values, lidars: parameters.lidars };
+        let reading =
+            RobotReading { map_values: parameters.map_values, lidars: parameters.lidars, ..Default::default() };
         node.watch(move |on, entity, is_there| events.push(Event::Entity(on, Box::new(entity), is_there), 0))?;
         Ok(Self {
             node,

@@ -229,12 +229,12 @@ impl Job<'_> {
             let file = bag.map_or_else(|| output.to_owned(), Bag::log);
             overrides.set_for_kind(LOG_SINK, "file", text_of(&file)?);
         }
+        let inputs = if self.inputs.is_empty() { Inputs::MapFiles } else { self.kind };
         if self.options.literal_thresholds {
-            let inputs = if self.inputs.is_empty() { Inputs::MapFiles } else { self.kind };
             overrides.set_for_kind(inputs.source_kind(), "literal_thresholds", true);
         }
         if !self.options.resolution.is_empty() {
-            overrides.set_for_kind(Inputs::MapFiles.source_kind(), "resolutions", robot_options::resolutions(self)?);
+            overrides.set_for_kind(inputs.source_kind(), "resolutions", robot_options::resolutions(self)?);
         }
         if !self.options.lidar.is_empty() {
             overrides.set_for_kind(Inputs::Logs.source_kind(), "lidars", robot_options::lidars(self)?);

@@ -42,7 +42,7 @@ pub(crate) struct RunOptions {
     /// Apply the thresholds of map files literally, even where these make unknown cells free or leave no walls.
     #[arg(long)]
     pub(crate) literal_thresholds: bool,
-    /// The side of a cell of a robot's map file, metres, instead of the resolution in the file.
+    /// The side of a cell of a robot's maps, metres, instead of the resolution in its map file or log.
     #[arg(long, value_name = "ROBOT=METRES")]
     pub(crate) resolution: Vec<String>,
     /// The pose of a robot's lidar on its base, metres and radians, instead of that in the log's tf. A fourth number is

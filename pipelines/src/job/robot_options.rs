@@ -16,10 +16,10 @@ pub(super) fn accepted(job: &Job<'_>) -> Result<Table, BadUse> {
     })
 }
 
-/// The resolutions of map files, a parameter of their source.
+/// The resolutions of maps, a parameter of their source.
 pub(super) fn resolutions(job: &Job<'_>) -> Result<Table, BadUse> {
-    if !job.inputs.is_empty() && job.kind != Inputs::MapFiles {
-        return Err(BadUse("--resolution is for map files (YAML), and the inputs are others".to_owned()));
+    if job.kind == Inputs::TopologyFiles {
+        return Err(BadUse("--resolution is for maps, and topological maps have none".to_owned()));
     }
     read(job, "resolution", &job.options.resolution, "ROBOT=METRES for the side of a cell, above 0", |side| {
         let side: f64 = side.parse().ok()?;

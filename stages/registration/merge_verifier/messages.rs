@@ -64,7 +64,7 @@ pub(super) fn scale_reason(scale: &Scale, pair: &RobotPair, cell: f64) -> String
     format!(
         "the maps may fit if {b} is {factor:.3} times as large: {inlier_length:.0} m of wall agree, {conflict_length:.0} m do not\n\
          missing: the right resolution of {b}, or of {a}\n\
-         try: cells of {side:.5} m instead of {cell:.5} m, if {a} is right; for map files --resolution {b}={side:.5}\n\n",
+         try: cells of {side:.5} m instead of {cell:.5} m, if {a} is right: --resolution {b}={side:.5}\n\n",
         side = factor * cell,
     )
 }

@@ -56,11 +56,19 @@ fn names_of(log: Vec<u8>) -> Vec<String> {
 fn lidars_on_one_base_are_those_of_one_robot() {
     let two = [("/sick1/scan", "laser1", "base_link"), ("/sick2/scan", "laser2", "base_link")];
     let (topics, note) = named(&[("log.mcap", lidars(&two, &["/odom"]))], &[]);
-    assert_eq!(topics, [["/tf_static", "/log/sick1/scan", "/log/sick2/scan", "/log/odom"]]);
+    assert_eq!(topics, [["/tf_static", "/log/scan", "/log/sick2/scan", "/log/odom"]], "one of them is read");
     assert!(note.starts_with("the scans on /sick1/scan, /sick2/scan are those of one robot, as tf has"), "{note}");
-    assert!(note.contains("`base_link`") && note.ends_with("--robots sick1,sick2 takes each lidar for a robot"));
+    assert!(
+        note.contains("`base_link`") && note.contains("--robots sick1,sick2 takes each lidar for a robot"),
+        "{note}"
+    );
+    let read = "the scans on /sick1/scan are read, as those on `/scan`; `--rename /sick2/scan=/scan` reads another";
+    assert!(note.ends_with(read), "{note}");
     let both = named(&[("log.mcap", lidars(&two, &[]))], &["sick1", "sick2"]).0;
     assert_eq!(both, [["/tf_static", "/sick1/scan", "/sick2/scan"]], "the user says so");
+    let folder = Folder::new();
+    let given = Input { robot: Some("r".into()), path: folder.write("a.mcap", &lidars(&two, &[])) };
+    assert_eq!(self::topics(&[given], &NameRules::default()), [["/tf_static", "/r/scan", "/r/sick2/scan"]]);
     let nameless = [("/scan", "laser", "r7/base_link"), ("/sick1/scan", "sick1", "r7/base_link")];
     assert_eq!(names_of(lidars(&nameless, &[])), ["/tf_static", "/r7/scan", "/r7/sick1/scan"]);
 }

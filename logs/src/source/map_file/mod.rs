@@ -9,11 +9,11 @@ pub(super) use stage::INTERVAL;
 pub use stage::MapFileSource;
 
 use crate::map_file::GridMap;
+use crate::robots::{Resolutions, problem_of_resolutions};
 use gridweave_runtime::ros::OccupancyGrid;
 use gridweave_runtime::stage::{Context, Out, OutputPorts, Outputs, ParameterError, Parameters, StageKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -31,16 +31,13 @@ pub struct MapFileSourceParameters {
     pub literal_thresholds: bool,
     /// Side of a cell of a robot's map, metres, instead of the resolution in its file. The position of the origin
     /// stays. Set by `--resolution` on the command line.
-    pub resolutions: BTreeMap<String, f64>,
+    pub resolutions: Resolutions,
 }
 
 impl Parameters for MapFileSourceParameters {
     fn check_together(&self) -> Vec<ParameterError> {
-        let wrong = self.resolutions.iter().find(|(_, side)| !(side.is_finite() && **side > 0.0));
-        let error = |(robot, side): (&String, &f64)| {
-            ParameterError::new("resolutions", format!("a cell of {robot} must be wider than 0 m, not {side}"))
-        };
-        wrong.map(error).into_iter().collect()
+        let wrong = problem_of_resolutions(&self.resolutions);
+        wrong.into_iter().map(|wrong| ParameterError::new("resolutions", wrong)).collect()
     }
 }
 

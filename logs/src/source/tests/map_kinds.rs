@@ -51,6 +51,52 @@ fn the_pixels_of_an_image_are_read_as_such_and_other_values_out_of_range_are_nam
 }
 
 #[test]
+fn maps_have_the_resolution_that_the_user_sets() {
+    let log = |log: &mut TestLog| {
+        for (second, robot) in (1..).zip(["a", "b"]) {
+            log.add(&format!("/{robot}/map"), OccupancyGrid::NAME, second, &map("map", &[0, 100, 0]));
+        }
+    };
+    for more in ["resolutions = { b = 0.0625 }", "resolutions = { b = 0.0625 }\nstart = 1e-9"] {
+        let maps = read(&log, more);
+        let resolution = |message: &Message| message.decode::<OccupancyGrid<'_>>().unwrap().info.resolution;
+        let by_robot: BTreeMap<String, f32> =
+            maps.on("map").iter().map(|message| (message.robot().to_owned(), resolution(message))).collect();
+        assert_eq!(by_robot, BTreeMap::from([("a".to_owned(), 0.05), ("b".to_owned(), 0.0625)]), "{more}");
+    }
+    let (_folder, files) = write(|file| log(file));
+    for (wrong, problem) in [("c = 0.05", "`resolutions` names `c`, which has no map"), ("b = 0.0", "wider than 0 m")] {
+        let error =
+            try_run(files.clone(), &format!("resolutions = {{ {wrong} }}"), RobotTopics::default()).err().unwrap();
+        assert!(error.to_string().contains(problem), "{error}");
+    }
+}
+
+#[test]
+fn a_robot_whose_maps_are_of_a_type_that_is_not_read_is_reported_beside_others() {
+    let log = |log: &mut TestLog| {
+        log.add("/a/map", OccupancyGrid::NAME, 1, &map("map", &[0, 100, 0]));
+        log.raw("/b/octomap_binary", "octomap_msgs/msg/Octomap", 2, b"");
+    };
+    let sent = read(&log, "");
+    let unmerged: Vec<UnmergedRobot> =
+        sent.on("localised").iter().map(|message| message.decode::<UnmergedRobot>().unwrap()).collect();
+    assert_eq!(unmerged.iter().map(|unmerged| &*unmerged.robot).collect::<Vec<_>>(), ["b"]);
+    assert!(unmerged[0].reason.contains("`projected_map` (nav_msgs/msg/OccupancyGrid), on `/b/map`"), "{unmerged:?}");
+    assert!(read(&log, "only_robots = ['a']").on("localised").is_empty(), "the user leaves it out");
+}
+
+#[test]
+fn maps_of_two_robots_on_one_topic_are_an_error() {
+    let (_folder, files) = write(|log| {
+        log.add("/a/map", OccupancyGrid::NAME, 1, &map("r1/map", &[0, 100, 0]));
+        log.add("/a/map", OccupancyGrid::NAME, 2, &map("r2/map", &[0, 100, 0]));
+    });
+    let error = try_run(files, "", RobotTopics::default()).err().unwrap();
+    assert!(error.to_string().contains("by their frames r1/map and r2/map"), "{error}");
+}
+
+#[test]
 fn a_merged_map_of_another_program_is_no_robot_wherever_it_comes() {
     let grid = [0, 0, 100, 0];
     let all = [("/map_merge/map", "world"), ("/a/map", "map"), ("/b/map", "b/map")];
