@@ -3,6 +3,10 @@
 //! A client may send nothing, or slowly, or without end, or not read what it is sent. None of that takes more than a
 //! connection for a while.
 
+mod web_socket;
+
+pub use web_socket::Pings;
+
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
 use std::sync::Arc;
@@ -182,28 +186,32 @@ impl Connection {
         self.stream.local_addr()
     }
 
-    /// Relays between the browser and a server until either closes, or the browser does not read for a while. `first`
-    /// is what the browser has sent already.
+    /// Relays a WebSocket between the browser and a server until either closes, or the browser does not read, or does not
+    /// answer pings, for a while. `first` is what the browser has sent already.
     ///
     /// # Errors
     /// The server cannot be reached, or a thread cannot be started.
-    pub fn relay(self, server: SocketAddr, first: &[u8]) -> io::Result<()> {
+    pub fn relay(self, server: SocketAddr, first: &[u8], pings: Pings) -> io::Result<()> {
         let mut server = TcpStream::connect(server)?;
         server.write_all(first)?;
         let browser = &self.stream;
-        browser.set_read_timeout(None)?;
+        browser.set_read_timeout(Some(pings.timeout))?;
         browser.set_write_timeout(Some(SEND_TIMEOUT))?;
         browser.set_nodelay(true)?;
         server.set_nodelay(true)?;
-        let pass = |mut from: &TcpStream, mut to: &TcpStream| {
-            // An error ends the relay, as an end does. The other direction is ended, too.
-            let _ = io::copy(&mut from, &mut to);
-            let _ = from.shutdown(Shutdown::Both);
-            let _ = to.shutdown(Shutdown::Both);
+        // An error ends the relay, as an end does. The other direction is ended, too.
+        let end = || {
+            let _ = browser.shutdown(Shutdown::Both);
+            let _ = server.shutdown(Shutdown::Both);
         };
         thread::scope(|scope| {
-            thread::Builder::new().spawn_scoped(scope, || pass(browser, &server))?;
-            pass(&server, browser);
+            thread::Builder::new().spawn_scoped(scope, || {
+                let (mut from, mut to) = (browser, &server);
+                let _ = io::copy(&mut from, &mut to);
+                end();
+            })?;
+            let _ = web_socket::copy_with_pings(&server, browser, pings);
+            end();
             Ok(())
         })
     }

@@ -4,12 +4,15 @@
 //! the run to each page that the user visits. The server of the Foxglove SDK checks nothing; so it listens on an
 //! address of this machine that a page cannot guess, and clients are relayed to it once they have been checked.
 
-use crate::browsers::{BrowserServer, Connection};
+use crate::browsers::{BrowserServer, Connection, Pings};
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::time::Duration;
 
 /// The maximum number of clients. The server queues messages for each that does not read.
 const MAX_CLIENTS: usize = 32;
+/// A client that is not there is noticed after three pings without an answer.
+const PINGS: Pings = Pings { interval: Duration::from_secs(15), timeout: Duration::from_secs(50) };
 /// The site of the app.
 const APP: &str = "foxglove.dev";
 
@@ -18,11 +21,15 @@ const APP: &str = "foxglove.dev";
 /// # Errors
 /// The address cannot be bound.
 pub(super) fn start(host: &str, port: u16, inner: SocketAddr, sites: Vec<String>) -> io::Result<BrowserServer> {
+    start_with(host, port, inner, sites, PINGS)
+}
+
+fn start_with(host: &str, port: u16, inner: SocketAddr, sites: Vec<String>, pings: Pings) -> io::Result<BrowserServer> {
     // A name of IPv6 is in brackets in a URL.
     let host = host.trim_start_matches('[').trim_end_matches(']');
     BrowserServer::start((host, port), MAX_CLIENTS, move |client| {
         // A client that has gone is no failure.
-        let _ = let_in(client, inner, &sites);
+        let _ = let_in(client, inner, &sites, pings);
     })
 }
 
@@ -35,7 +42,7 @@ pub(super) fn random_address() -> io::Result<Ipv4Addr> {
     Ok(Ipv4Addr::new(127, second, third, fourth.clamp(1, 254)))
 }
 
-fn let_in(mut client: Connection, inner: SocketAddr, sites: &[String]) -> io::Result<()> {
+fn let_in(mut client: Connection, inner: SocketAddr, sites: &[String], pings: Pings) -> io::Result<()> {
     let Some(request) = client.request()? else { return Ok(()) };
     let own = client.local_address()?.ip();
     match request.origin {
@@ -45,7 +52,7 @@ fn let_in(mut client: Connection, inner: SocketAddr, sites: &[String]) -> io::Re
             );
             client.respond("403 Forbidden", "text/plain; charset=utf-8", "wrong origin\n")
         }
-        _ => client.relay(inner, &request.bytes),
+        _ => client.relay(inner, &request.bytes, pings),
     }
 }
 
@@ -75,7 +82,6 @@ mod tests {
     use super::*;
     use std::io::{Read, Write};
     use std::net::{TcpListener, TcpStream};
-    use std::time::Duration;
 
     #[test]
     fn pages_of_this_machine_and_of_the_app_are_trusted_and_others_are_not() {
@@ -133,5 +139,54 @@ mod tests {
         let is_closed = || TcpStream::connect(address).is_err();
         assert!((0..1_000_000).any(|_| is_closed()), "the port is closed");
         assert_ne!(random_address().unwrap(), random_address().unwrap());
+    }
+
+    /// A front for a server that starts a WebSocket and sends one frame, with the connection of that server to its client,
+    /// and a client.
+    fn web_socket(pings: Pings) -> (BrowserServer, TcpStream, TcpStream) {
+        let inner = TcpListener::bind("127.0.0.1:0").unwrap();
+        let front = start_with("127.0.0.1", 0, inner.local_addr().unwrap(), Vec::new(), pings).unwrap();
+        let mut client = TcpStream::connect(front.address()).unwrap();
+        client.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+        client.write_all(b"GET / HTTP/1.1\r\nHost: a\r\nUpgrade: websocket\r\n\r\n").unwrap();
+        let (mut server, _) = inner.accept().unwrap();
+        server.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+        server.write_all(b"HTTP/1.1 101 Switching Protocols\r\n\r\n\x82\x03abc").unwrap();
+        (front, server, client)
+    }
+
+    #[test]
+    fn a_client_that_answers_no_ping_is_closed() {
+        let soon = Duration::from_millis(1);
+        let (_front, mut server, mut client) = web_socket(Pings { interval: soon, timeout: soon });
+        let mut all = Vec::new();
+        // It may be reset, since the answer to nothing is not read.
+        let _ = client.read_to_end(&mut all);
+        let mut rest = Vec::new();
+        server.read_to_end(&mut rest).unwrap();
+        assert!(rest.ends_with(b"\r\n\r\n"), "the server is told");
+    }
+
+    #[test]
+    fn a_client_that_answers_pings_stays() {
+        let pings = Pings { interval: Duration::from_millis(1), timeout: Duration::from_secs(60) };
+        let (_front, mut server, mut client) = web_socket(pings);
+        let mut head = [0; 36];
+        client.read_exact(&mut head).unwrap();
+        assert!(head.ends_with(b"\r\n\r\n"));
+        let mut frames = Vec::new();
+        while frames.iter().filter(|frame| **frame == [0x89, 0]).count() < 10 {
+            let mut start = [0; 2];
+            client.read_exact(&mut start).unwrap();
+            let mut content = vec![0; usize::from(start[1])];
+            client.read_exact(&mut content).unwrap();
+            frames.push([&start[..], &content].concat());
+            client.write_all(&[0x8a, 0x80, 0, 0, 0, 0]).unwrap();
+        }
+        assert_eq!(frames.iter().filter(|frame| **frame == *b"\x82\x03abc").count(), 1, "frames are whole");
+        drop(client);
+        let mut rest = Vec::new();
+        server.read_to_end(&mut rest).unwrap();
+        assert!(rest.windows(2).any(|bytes| bytes == [0x8a, 0x80]), "answers pass");
     }
 }
