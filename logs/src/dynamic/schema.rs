@@ -8,6 +8,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The maximum nesting of types. Those of ROS are nested about 6 deep.
 const DEEPEST: usize = 64;
 
+/// The maximum length of a definition with those of all types that it uses, bytes. Those of ROS have some ten thousand.
+const LONGEST: usize = 1 << 20;
+
 /// A message type, with all types that it uses.
 #[derive(Clone, Debug)]
 pub struct Schema {
@@ -78,6 +81,14 @@ pub enum SchemaError {
     /// A type and those that it uses have too many fields.
     #[error("the definition of {0} has more than {MOST_FIELDS} fields with those of the types in it")]
     ManyFields(String),
+    /// A definition is too long.
+    #[error("the definition of {name} has {length} bytes, and at most {LONGEST} are read")]
+    Long {
+        /// The type.
+        name: String,
+        /// The length of its definition.
+        length: usize,
+    },
     /// A type contains itself, or types are nested too deeply.
     #[error("the definition of {0} contains itself, or is nested too deeply")]
     Nested(String),
@@ -103,6 +114,9 @@ impl Schema {
     /// Parses the schema of the type `name` (`package/msg/Type`): its definition and then, each after a line of `=` and
     /// a line `MSG: package/Type`, the definitions of all types that it uses.
     pub fn parse(name: &str, text: &str) -> Result<Self, SchemaError> {
+        if text.len() > LONGEST {
+            return Err(SchemaError::Long { name: name.to_owned(), length: text.len() });
+        }
         let sections = sections(name, text);
         let mut builder = Builder { sections, done: BTreeMap::new(), types: Vec::new(), field_count: 0 };
         builder.add(&short_name(name), 0)?;

@@ -278,6 +278,17 @@ fn fields_without_bytes(fields: usize) -> String {
 }
 
 #[test]
+fn a_definition_is_limited_by_its_length_whatever_it_holds() {
+    let with = |line: &str, lines: usize| Schema::parse("a/msg/A", &format!("int8 x\n{}", line.repeat(lines)));
+    assert!(with("# x\n", 100_000).is_ok());
+    for line in ["# x\n", "===\nMSG: b/B\n", "int8 A=1\n"] {
+        let error = with(line, 1_000_000).unwrap_err();
+        assert!(matches!(error, SchemaError::Long { .. }), "{error}");
+        assert!(error.to_string().starts_with("the definition of a/msg/A has "), "{error}");
+    }
+}
+
+#[test]
 fn fields_without_bytes_are_limited_by_the_length_of_the_message() {
     let elements =
         |count: u32, rest: usize| [&[0, 1, 0, 0][..], &[0; 4], &count.to_le_bytes(), &vec![0; rest]].concat();
