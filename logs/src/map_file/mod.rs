@@ -6,6 +6,7 @@
 mod description;
 mod error;
 mod load;
+mod middle_grey;
 mod reading;
 mod save;
 mod shades;
@@ -17,7 +18,7 @@ pub use load::{image_of, load, load_as};
 pub use reading::Thresholds;
 pub use save::{image_beside, save};
 pub use sink::kind;
-pub use warning::{MapFileWarning, UnknownGrey};
+pub use warning::{MapFileWarning, Misread, UnknownGrey};
 
 use gridweave_runtime::ros::{MapMetaData, OccupancyGrid};
 

@@ -1,9 +1,11 @@
 //! The interpretation of the shades of a map's image as occupancy.
 
 use super::Mode;
+use super::middle_grey::unknown_middle;
 use super::shades::{Histogram, Shades, is_transparent};
-use super::warning::{MapFileWarning, UnknownGrey};
+use super::warning::{MapFileWarning, Misread, UnknownGrey};
 use gridweave_runtime::ros::cell;
+use std::ops::RangeInclusive;
 
 /// The shade in which map savers write unknown cells.
 const UNKNOWN_SHADE: usize = 205;
@@ -76,24 +78,35 @@ impl Reading {
             _ => literally(*shade) < self.free_thresh,
         };
         let misread: u64 = range.clone().filter(is_free).map(|shade| greys[shade]).sum();
-        let is_misread = stands_out && misread > 0;
+        let of_map_saver =
+            (stands_out && misread > 0).then_some((range.clone(), misread, Misread::Free(self.free_thresh)));
+        let middle = || unknown_middle(&greys).filter(|_| !is_noisy && !shades.is_lossy());
+        let unknown = of_map_saver.or_else(|| {
+            let middle = middle()?;
+            let misread = of_histogram.literally(middle, has_opacity)?;
+            Some((middle..=middle, greys[middle], misread))
+        });
         let darkest = greys.iter().position(|count| *count > 0).map_or(0.0, occupancy_of);
         let above = self.free_thresh.max(occupancy_of(shade));
         let has_grey_walls =
             self.mode == Mode::Trinary && darkest <= self.occupied_thresh && darkest > above + LEAST_CONTRAST;
-        let [one, other] = [*range.start(), *range.end()].map(|shade| if self.negate { 255 - shade } else { shade });
-        let (first, last) = (one.min(other), one.max(other));
+        let in_image = |range: &RangeInclusive<usize>| {
+            let [one, other] =
+                [*range.start(), *range.end()].map(|shade| if self.negate { 255 - shade } else { shade });
+            (one.min(other), one.max(other))
+        };
+        let shades_of_unknown = unknown.as_ref().map(|(range, ..)| in_image(range));
         let reading = Self {
-            unknown: is_misread.then(|| (grey_of(first), grey_of(last))),
+            unknown: shades_of_unknown.map(|(first, last)| (grey_of(first), grey_of(last))),
             occupied_thresh: if has_grey_walls { (above + darkest) / 2.0 } else { self.occupied_thresh },
             transparent_is_unknown: has_opacity,
             ..self
         };
         let warning = MapFileWarning {
-            unknown: is_misread.then_some(UnknownGrey {
-                cells: misread,
-                shades: (first, last),
-                free_thresh: self.free_thresh,
+            unknown: unknown.zip(shades_of_unknown).map(|((_, cells, misread), shades)| UnknownGrey {
+                cells,
+                shades,
+                misread,
                 is_noisy,
             }),
             walls: has_grey_walls.then_some((darkest, self.occupied_thresh)),
@@ -101,6 +114,16 @@ impl Reading {
             ..Default::default()
         };
         (reading, warning)
+    }
+
+    /// What the thresholds make of a shade that is unknown; `None` if it is neither free nor occupied by them.
+    fn literally(&self, shade: usize, has_opacity: bool) -> Option<Misread> {
+        let opacity = (has_opacity && self.mode == Mode::Trinary).then_some(255.0);
+        let cell = self.cell(&[shade as f64; 3], opacity, 255.0);
+        if cell::is_free(cell) {
+            return Some(Misread::Free(self.free_thresh));
+        }
+        cell::is_occupied(cell).then_some(Misread::Occupied(self.occupied_thresh))
     }
 
     /// The cell for a pixel: grey or three colours; the last of an even number of samples is the opacity.

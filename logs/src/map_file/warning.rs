@@ -23,27 +23,45 @@ pub struct MapFileWarning {
     pub inverted: Option<(u64, u64)>,
 }
 
-/// Cells in the grey of unknown ones that the thresholds would make free.
+/// What the thresholds of a file would make of cells in the grey of unknown ones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Misread {
+    /// Free, by this `free_thresh`.
+    Free(f64),
+    /// Occupied, by this `occupied_thresh`.
+    Occupied(f64),
+}
+
+impl fmt::Display for Misread {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Free(threshold) => write!(f, "with free_thresh {threshold} they would be free"),
+            Self::Occupied(threshold) => write!(f, "with occupied_thresh {threshold} they would be occupied"),
+        }
+    }
+}
+
+/// Cells in the grey of unknown ones that the thresholds would make free or occupied.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnknownGrey {
     /// The number of these cells.
     pub cells: u64,
-    /// The first and the last shade; both are 205 from a map saver.
+    /// The first and the last shade; both are 205 from a map saver, and 128 from Cartographer.
     pub shades: (usize, usize),
-    /// The `free_thresh` of the file.
-    pub free_thresh: f64,
+    /// What they would be.
+    pub misread: Misread,
     /// Whether the image has noise about its shades as a JPEG has, and is none.
     pub is_noisy: bool,
 }
 
 impl fmt::Display for UnknownGrey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { cells, shades: (first, last), free_thresh, is_noisy } = self;
+        let Self { cells, shades: (first, last), misread, is_noisy } = self;
         write!(f, "{cells} cells in grey {first}")?;
         if last > first {
             write!(f, " to {last}")?;
         }
-        write!(f, " are read as unknown; with free_thresh {free_thresh} they would be free")?;
+        write!(f, " are read as unknown; {misread}")?;
         match is_noisy {
             true => f.write_str(" (its shades are as noisy as those of an image that was a JPEG)"),
             false => Ok(()),

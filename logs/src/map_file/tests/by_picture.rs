@@ -86,3 +86,46 @@ fn bmp_and_jpeg_are_read() {
         assert_eq!(middle, [100, -1, 0], "{name}: {warning:?}");
     }
 }
+
+#[test]
+fn the_grey_of_unknown_cells_of_cartographer_is_unknown_whatever_the_thresholds() {
+    // Black walls, white free space and grey 128 between, with a few cells that were seen once.
+    let cartographer = |unknown: u8| {
+        let shades = [[0].repeat(4), [254].repeat(12), [unknown].repeat(40), vec![unknown - 10, unknown + 10]].concat();
+        [b"P5\n# Cartographer map; 0.05 m/pixel\n58 1\n255\n".as_slice(), &shades].concat()
+    };
+    let read = |image: &[u8], more: &str| {
+        let (folder, path) = folder(&format!("image: map.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n{more}"));
+        fs::write(folder.path().join("map.pgm"), image).unwrap();
+        let (map, warning) = load_as(&path, Thresholds::ByPicture).unwrap();
+        let of = |cells: &[i8]| cells.first().copied().filter(|first| cells.iter().all(|cell| cell == first));
+        let cells = [&map.cells[..4], &map.cells[4..16], &map.cells[16..56]].map(of);
+        (cells, warning.map(|warning| warning.to_string()).unwrap_or_default())
+    };
+    let expected = [Some(100), Some(0), Some(-1)];
+    let thresholds = |occupied: f64, free: f64| format!("occupied_thresh: {occupied}\nfree_thresh: {free}");
+    assert_eq!(read(&cartographer(128), &thresholds(0.65, 0.196)), (expected, String::new()));
+    for unknown in [127, 128] {
+        let (cells, warning) = read(&cartographer(unknown), &thresholds(0.65, 0.6));
+        assert_eq!(cells, expected);
+        let start = format!("40 cells in grey {unknown} are read as unknown; with free_thresh 0.6 they would be free");
+        assert!(warning.starts_with(&start), "{warning}");
+        let (cells, warning) = read(&cartographer(unknown), &thresholds(0.4, 0.3));
+        assert_eq!(cells, expected);
+        assert!(warning.contains("with occupied_thresh 0.4 they would be occupied"), "{warning}");
+        let scale = format!("mode: scale\n{}", thresholds(0.65, 0.196));
+        assert_eq!(read(&cartographer(unknown), &scale).0, expected);
+    }
+    let inverted: Vec<u8> = cartographer(128).iter().rev().take(58).rev().map(|shade| 255 - shade).collect();
+    let image = [b"P5\n58 1\n255\n".as_slice(), &inverted].concat();
+    assert_eq!(read(&image, &format!("negate: 1\n{}", thresholds(0.4, 0.3))).0, expected);
+    // Grey furniture on a floor plan, rarer than the walls, is as the thresholds say.
+    let plan = [[0].repeat(30), [254].repeat(20), [128].repeat(8)].concat();
+    let image = [b"P5\n58 1\n255\n".as_slice(), &plan].concat();
+    let [walls, floor, furniture] = [0..30, 30..50, 50..58];
+    let (folder, path) = folder(&yaml("").replace("0.65", "0.4"));
+    fs::write(folder.path().join("map.pgm"), image).unwrap();
+    let cells = load_as(&path, Thresholds::ByPicture).unwrap().0.cells;
+    assert!(cells[walls].iter().chain(&cells[furniture]).all(|cell| *cell == 100));
+    assert!(cells[floor].iter().all(|cell| *cell == 0));
+}
