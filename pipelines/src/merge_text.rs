@@ -96,12 +96,21 @@ pub(crate) fn short(reason: &str) -> &str {
     reason.split("\n\n").next().unwrap_or(reason).trim_end()
 }
 
+/// The variance of the position of a map where it is surest, square metres: at the point that its uncertain turn leaves
+/// where it is, in the area that the maps have in common. The origin of the frame may be far away, as that of UTM, where a
+/// turn moves it by kilometres.
+fn position_variance(covariance: &[f64; 9]) -> f64 {
+    let [xx, _, x_yaw, _, yy, y_yaw, _, _, yaw] = *covariance;
+    let by_turn = if yaw > 0.0 { (x_yaw * x_yaw + y_yaw * y_yaw) / yaw } else { 0.0 };
+    (xx + yy - by_turn).max(0.0)
+}
+
 /// Makes the table of map frames with their standard deviations.
 fn frames_table(frames: &BTreeMap<String, Frame>) -> Table {
     let mut table = Table::new(["robot", "x m", "y m", "yaw deg", "std m", "std deg"]);
     for (robot, Frame { x, y, yaw, covariance }) in frames {
-        let variance = |place: usize| covariance[place].max(0.0);
-        let [std_position, std_yaw] = [(variance(0) + variance(4)).sqrt(), variance(8).sqrt().to_degrees()];
+        let std_position = position_variance(covariance).sqrt();
+        let std_yaw = covariance[8].max(0.0).sqrt().to_degrees();
         let numbers = [*x, *y, yaw.to_degrees(), std_position, std_yaw];
         table.row(std::iter::once(robot.clone()).chain(numbers.map(|number| format!("{number:.3}"))));
     }
@@ -224,5 +233,20 @@ mod tests {
         write_explanation(&mut explained, &serde_json::from_value(merge).unwrap(), "robot2", None).unwrap();
         assert!(explained.contains("robot1 and robot2, refused with 0.250 by maps:\n  the maps fit"), "{explained}");
         assert_eq!(explained.matches("the whole of it").count(), 1);
+    }
+
+    #[test]
+    fn a_position_is_as_sure_as_where_the_maps_meet_however_far_the_origin_is() {
+        // A turn of 0.005 radians about a point that is so far from the origin of the frame.
+        let deviation = |x: f64, y: f64| {
+            let [turn, position] = [0.005_f64.powi(2), 0.03_f64.powi(2)];
+            let [xx, xy, yy] = [position + turn * y * y, -turn * x * y, position + turn * x * x];
+            let covariance = [xx, xy, -turn * y, xy, yy, turn * x, -turn * y, turn * x, turn];
+            position_variance(&covariance).sqrt()
+        };
+        for (x, y) in [(0.0, 0.0), (12.0, -5.0), (5e5, 4e6)] {
+            assert!((deviation(x, y) - 0.03 * 2_f64.sqrt()).abs() < 1e-4, "{}", deviation(x, y));
+        }
+        assert_eq!(position_variance(&[0.0; 9]), 0.0);
     }
 }
