@@ -1,5 +1,6 @@
 //! Damage to a log that is still readable in part.
 
+use super::expansion::limit;
 use serde::Serialize;
 
 /// The maximum uncompressed size of a chunk, bytes: the most that a log of Gridweave has in one, and less than would
@@ -135,6 +136,9 @@ pub enum ChunkFault {
         LARGEST_OVERLAP
     )]
     Overlap,
+    /// The chunks of the file unpack to far more than the file.
+    #[error("its contents with those of the chunks before it take more than {}", limit())]
+    Expansion,
     /// There is not enough memory.
     #[error("there is not enough memory for its contents")]
     TooLarge,

@@ -5,6 +5,7 @@ use super::bytes::{FileBytes, Window};
 use super::chunk::Chunk;
 use super::damage::{ChunkFault, Damage, LARGEST, MOST_REPORTS};
 use super::definitions::Definitions;
+use super::expansion::drop_excess;
 use super::record::{Fields, HEAD, MessageRecord, Record};
 use super::summary::{Statistics, SummarySection};
 use super::supplement::{SupplementKind, damage_of, read_metadata};
@@ -52,6 +53,8 @@ impl Layout {
             // A chunk may describe channels that are described nowhere else.
             unsure = layout.blocks.iter().map(|block| matches!(block.records, Records::Chunk(_))).collect();
         }
+        let excess = drop_excess(&mut layout.blocks, file.len());
+        layout.damage.extend(excess);
         layout.definitions.merge(summary.definitions);
         layout.statistics = summary.statistics;
         layout.survey(file, &unsure);

@@ -30,6 +30,7 @@ mod damage;
 mod definition_records;
 mod definitions;
 mod error;
+mod expansion;
 mod file;
 mod guess;
 mod layout;

@@ -7,6 +7,7 @@ use crate::reader::bytes::{FileBytes, Window};
 use crate::reader::chunk::{decompress_bz2, decompress_lz4};
 use crate::reader::damage::{ChunkFault, Damage, LARGEST};
 use crate::reader::definitions::{MOST_BYTES, MOST_CHANNELS};
+use crate::reader::expansion::drop_excess;
 use crate::reader::layout::Layout;
 use crate::reader::record::{Fields, push_message};
 use gridweave_runtime::message::Channel;
@@ -36,7 +37,9 @@ impl Bag {
     pub(crate) fn open(file: FileBytes) -> (Self, Layout) {
         let mut walk = Walk { layout: Layout::default(), connections: BTreeMap::new(), unsure: Vec::new() };
         walk.walk(&file);
+        let excess: Vec<Damage> = drop_excess(&mut walk.layout.blocks, file.len()).collect();
         walk.survey(&file);
+        walk.layout.damage.extend(excess);
         let Walk { layout, connections, .. } = walk;
         (Self { file, connections }, layout)
     }
