@@ -21,6 +21,8 @@ pub(super) struct ShownRobot {
     pub(super) sentence: String,
     /// How the user says that it is not so; empty if no option does.
     pub(super) otherwise: String,
+    /// Whether its name alone shows it.
+    by_name: bool,
 }
 
 /// The robots that the frames in logs show, by input.
@@ -35,8 +37,9 @@ pub(super) struct ShownRobots {
 }
 
 impl ShownRobots {
-    /// Looks for robots in logs; of those that the user has named, only for the lidar that is read. `channels` are those of each input, and `given`
-    /// the robots that are to be read. Only logs that have such lidars or maps are read, and only their beginnings.
+    /// Looks for robots in logs; of those that the user has named, only for the lidar that is read. `channels` are those
+    /// of each input, and `given` the robots that are to be read. Only logs that have such lidars or maps are read, and
+    /// only their beginnings.
     pub(super) fn find(
         files: &Arc<[LogFile]>,
         input_of: &[usize],
@@ -80,7 +83,9 @@ impl ShownRobots {
                     shown.choose_scans(*input, read, &others, robots);
                 }
                 let otherwise = format!(", and {} takes each lidar for a robot", one.option);
-                shown.only.insert(*input, ShownRobot { name: one.name, sentence: one.sentence, otherwise });
+                shown
+                    .only
+                    .insert(*input, ShownRobot { name: one.name, sentence: one.sentence, otherwise, by_name: false });
             } else if let Some(topic) = map_topic.as_ref().filter(|_| mapped.contains(input)) {
                 shown.add_map(*input, owner(&channels[*input], topic, &roles[*input], frames), topic, robots);
             }
@@ -107,7 +112,8 @@ impl ShownRobots {
         match owner {
             Some(MapOwner::OfLog(robot)) => {
                 let sentence = format!("the maps on `{topic}` are in the frame `{robot}/map`");
-                self.only.insert(input, ShownRobot { name: Some(robot), sentence, otherwise: String::new() });
+                let (name, otherwise) = (Some(robot), String::new());
+                self.only.insert(input, ShownRobot { name, sentence, otherwise, by_name: true });
             }
             Some(MapOwner::OfRobot(robot)) => {
                 self.notes.push(format!(
@@ -135,8 +141,10 @@ impl ShownRobots {
         for (input, name) in &names {
             let is_taken = names.iter().any(|(other, same)| other != input && same == name)
                 || named.iter().enumerate().any(|(other, robots)| other != *input && robots.contains(name));
-            if is_taken {
-                self.only.remove(input);
+            match self.only.get_mut(input).filter(|_| is_taken) {
+                Some(robot) if robot.by_name => _ = self.only.remove(input),
+                Some(robot) => robot.name = None,
+                None => {}
             }
         }
     }

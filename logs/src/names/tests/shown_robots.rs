@@ -109,6 +109,12 @@ fn logs_whose_lidars_have_namespaces_are_distinguished_by_their_files() {
     let of = [("/front/scan", "front", "base_link"), ("/rear/scan", "rear", "base_link")];
     let (topics, _) = named(&[("red.mcap", lidars(&of, &["/odom"])), ("blue.mcap", lidars(&of, &["/odom"]))], &[]);
     assert!(topics[0].contains(&"/red/front/scan".into()) && topics[1].contains(&"/blue/front/scan".into()));
+    let based = || {
+        let of = [("/front/scan", "front", "r7/base_link"), ("/rear/scan", "rear", "r7/base_link")];
+        lidars(&of, &[])
+    };
+    let (topics, _) = named(&[("red.mcap", based()), ("blue.mcap", based())], &[]);
+    assert!(topics[0].contains(&"/red/front/scan".into()) && topics[1].contains(&"/blue/front/scan".into()));
     let mut other = TestLog::new(layouts()[1].clone());
     add_map(&mut other, "/map", "map");
     other.raw("/odom", Odometry::NAME, 4, b"");
