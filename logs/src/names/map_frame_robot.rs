@@ -21,11 +21,11 @@ const WORLDS: [&str; 3] = ["world", "earth", "global"];
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum MapOwner {
     /// The maps are this robot's, and the topics of the log name no robot.
-    OfLog(String),
+    Log(String),
     /// The maps are this robot's, beside other robots.
-    OfRobot(String),
+    Robot(String),
     /// The maps are those of several robots, in these frames.
-    OfSeveral(BTreeSet<String>),
+    Several(BTreeSet<String>),
 }
 
 /// The topic of maps without the name of a robot; `None` if the pipeline has none.
@@ -51,7 +51,7 @@ pub(super) fn owner(
     let of_maps: BTreeSet<&str> = maps.flat_map(|(number, _)| frames.of(*number)).collect();
     let robots: BTreeSet<&str> = of_maps.iter().filter_map(|frame| robot_of_map(frame)).collect();
     if robots.len() > 1 && robots.len() == of_maps.len() {
-        return Some(MapOwner::OfSeveral(of_maps.iter().map(|frame| (*frame).to_owned()).collect()));
+        return Some(MapOwner::Several(of_maps.iter().map(|frame| (*frame).to_owned()).collect()));
     }
     let robot = robots.first().filter(|_| of_maps.len() == 1).copied()?;
     let (mut named, mut with_maps) = (BTreeSet::new(), BTreeSet::new());
@@ -79,10 +79,10 @@ pub(super) fn owner(
     let has_body = channels.iter().any(|(_, channel)| channel.topic.starts_with(&under))
         || frames.edges().any(|(_, child)| robot_of_body(child) == Some(robot));
     match (named.is_empty(), with_maps.len()) {
-        (true, _) => Some(MapOwner::OfLog(robot.to_owned())),
+        (true, _) => Some(MapOwner::Log(robot.to_owned())),
         // Beside the maps of two robots there may be one that a program made of them.
-        (false, 0 | 1) => Some(MapOwner::OfRobot(robot.to_owned())),
-        (false, _) => has_body.then(|| MapOwner::OfRobot(robot.to_owned())),
+        (false, 0 | 1) => Some(MapOwner::Robot(robot.to_owned())),
+        (false, _) => has_body.then(|| MapOwner::Robot(robot.to_owned())),
     }
 }
 

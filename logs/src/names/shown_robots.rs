@@ -110,12 +110,12 @@ impl ShownRobots {
 
     fn add_map(&mut self, input: usize, owner: Option<MapOwner>, topic: &str, robots: &RobotTopics) {
         match owner {
-            Some(MapOwner::OfLog(robot)) => {
+            Some(MapOwner::Log(robot)) => {
                 let sentence = format!("the maps on `{topic}` are in the frame `{robot}/map`");
                 let (name, otherwise) = (Some(robot), String::new());
                 self.only.insert(input, ShownRobot { name, sentence, otherwise, by_name: true });
             }
-            Some(MapOwner::OfRobot(robot)) => {
+            Some(MapOwner::Robot(robot)) => {
                 self.notes.push(format!(
                     "the maps on `{topic}` are in the frame `{robot}/map`, and are read as those of {robot}; `--rename \
                      {topic}={}` makes them another robot's",
@@ -123,7 +123,7 @@ impl ShownRobots {
                 ));
                 self.of_map.insert(input, robot);
             }
-            Some(MapOwner::OfSeveral(frames)) => self.notes.push(format!(
+            Some(MapOwner::Several(frames)) => self.notes.push(format!(
                 "`{topic}` has the maps of several robots, by their frames {}: record those of each robot on a topic of its \
                  own, `{}`",
                 list_in_words(&frames),
