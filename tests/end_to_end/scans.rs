@@ -170,9 +170,7 @@ fn robots_whose_odometry_drifts_are_merged() {
 /// How many robots were refined in one pose graph.
 fn refined_together(folder: &Path) -> Value {
     let summary: Value = serde_json::from_slice(&std::fs::read(folder.join("summary.json")).unwrap()).unwrap();
-    let stages = summary["stages"].as_array().unwrap();
-    let mapper = stages.iter().find(|stage| stage[0] == "mapper").unwrap();
-    mapper[1]["counts"]["robots refined together"].clone()
+    summary["stages"]["mapper"]["counts"]["robots refined together"].clone()
 }
 
 /// The lidar of robot2 sees too little to find its way.

@@ -30,6 +30,8 @@ mod scan_odometry;
 mod slam_map;
 mod stage;
 #[cfg(test)]
+mod tag_tests;
+#[cfg(test)]
 mod test_drive;
 #[cfg(test)]
 mod tests;
