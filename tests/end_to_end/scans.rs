@@ -165,9 +165,15 @@ fn robots_whose_odometry_drifts_are_merged() {
     gridweave(folder, &[&apart[..], &["--set", "mapper.joint_refinement=false"]].concat())
         .assert(0, &["merged 2 of 2"]);
     assert_eq!(refined_together(folder), Value::Null);
+    // The map of one is recorded, and the other's scans are straightened by it.
+    let mixed = ["filter", "in.mcap", "-o", "scans.mcap", "--topics", "/robot1/map,/robot2/scan,/robot2/odom"];
+    gridweave(folder, &mixed).assert(0, &[]);
+    merge(folder).assert(0, &["no map of robot2: maps are built from scans", "merged 2 of 2"]);
+    assert_eq!(judged(folder), [1, 0].map(Value::from));
+    assert_eq!(refined_together(folder), 1);
 }
 
-/// How many robots were refined in one pose graph.
+/// How many robots with scans were refined in one pose graph.
 fn refined_together(folder: &Path) -> Value {
     let summary: Value = serde_json::from_slice(&std::fs::read(folder.join("summary.json")).unwrap()).unwrap();
     summary["stages"]["mapper"]["counts"]["robots refined together"].clone()

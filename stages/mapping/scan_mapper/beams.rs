@@ -1,7 +1,7 @@
 //! Beams of a scan, in the frame of the robot's base.
 
 use super::ScanMapperParameters;
-use crate::shared::geometry::{Pose2, pose};
+use crate::shared::geometry::{Point2, Pose2, pose};
 use gridweave_runtime::ros::RangeScan;
 
 /// A beam.
@@ -60,6 +60,25 @@ impl ScanBeams {
         let beams = beams.collect();
         let duration = scan.ranges.len().saturating_sub(1) as f64 * time_increment;
         Some(Self { transform_base_lidar: pose(x, y, yaw), beams, duration })
+    }
+
+    /// The scan of a robot that stands still where it is at the first beam; `moved(delay)` is where it really is that many
+    /// seconds later, relative to there.
+    pub fn without_motion(&self, moved: impl Fn(f64) -> Option<Pose2>) -> Self {
+        let mut still = self.clone();
+        if self.duration == 0.0 {
+            return still;
+        }
+        let transform_lidar_base = self.transform_base_lidar.inverse();
+        for beam in &mut still.beams {
+            let Some(base) = moved(beam.delay) else { continue };
+            let (sine, cosine) = beam.angle.sin_cos();
+            let end = Point2::new(cosine * beam.range, sine * beam.range);
+            let end = transform_lidar_base * (base * (self.transform_base_lidar * end));
+            (beam.angle, beam.range, beam.delay) = (end.y.atan2(end.x), end.coords.norm(), 0.0);
+        }
+        still.duration = 0.0;
+        still
     }
 
     /// Number of beams with a hit.

@@ -4,17 +4,27 @@ use super::ScanMapperParameters;
 use super::robot::Robot;
 use super::slam_map::SlamMap;
 use crate::mapping::map_cleaner::{MapCleanerParameters, clean};
-use crate::mapping::slam::{FramedTrajectory, joint_contradictions, joint_poses};
+use crate::mapping::slam::{FramedTrajectory, ScanPoint, Trajectory, joint_contradictions, joint_poses, recorded_map};
 use crate::registration::judgement::UserKnowledge;
 use crate::registration::{PreparedPair, RegistrationParameters, register};
 use crate::shared::geometry::{Grid, Point2, Pose2};
 use crate::shared::scan_grid::SnapshotMap;
+use crate::shared::walls::{NORMAL_RADIUS, WallMap};
+use nalgebra::Vector2;
 use std::collections::BTreeMap;
 
-/// A robot with the map that was drawn of its scans, without what is no wall.
+/// A robot with its map without what is no wall.
 struct MappedRobot<'a> {
-    slam: &'a mut SlamMap,
+    source: Source<'a>,
     map: SnapshotMap,
+}
+
+/// Where the map of a robot is from.
+enum Source<'a> {
+    /// It is drawn of its scans.
+    Scans(&'a mut SlamMap),
+    /// The robot has sent it.
+    Recorded(Trajectory),
 }
 
 /// A robot of a group, and the pose of its map frame in that of the first.
@@ -23,11 +33,20 @@ struct Member {
     frame: Pose2,
 }
 
-/// Refines the trajectories of robots together whose maps are merged without doubt, each in its own frame as before.
-/// Trajectories of which the scans contradict each other at the common poses stay as they are. Returns how many robots
-/// are refined with others.
-pub(super) fn refine_together(robots: &mut BTreeMap<String, Robot>, parameters: &ScanMapperParameters) -> usize {
-    let mut mapped: Vec<MappedRobot<'_>> = robots.values_mut().filter_map(MappedRobot::of).collect();
+/// Refines the trajectories of robots together whose maps are merged without doubt, each in its own frame as before, with
+/// the maps that others have `recorded`, which are rigid. Trajectories of which the scans contradict each other at the
+/// common poses stay as they are. Returns how many robots with scans are refined with others.
+pub(super) fn refine_together(
+    robots: &mut BTreeMap<String, Robot>,
+    recorded: &BTreeMap<String, SnapshotMap>,
+    parameters: &ScanMapperParameters,
+) -> usize {
+    let with_scans: Vec<MappedRobot<'_>> = robots.values_mut().filter_map(MappedRobot::of).collect();
+    if with_scans.is_empty() {
+        return 0;
+    }
+    let recorded = recorded.values().filter_map(MappedRobot::of_map);
+    let mut mapped: Vec<MappedRobot<'_>> = recorded.chain(with_scans).collect();
     let groups = groups(&mapped);
     groups.iter().map(|group| refine_group(group, &mut mapped, parameters)).sum()
 }
@@ -39,24 +58,70 @@ impl<'a> MappedRobot<'a> {
         if robot.bad_scans().is_some() || robot.is_mirrored() {
             return None;
         }
-        let mut map = robot.map().0?;
-        let drawn = map.cells.clone();
-        let grid = Grid { geometry: map.geometry, cells: &drawn };
-        clean(&grid, &MapCleanerParameters::default(), &mut map.cells);
-        Some(Self { slam: robot.slam_map_mut()?, map })
+        let map = cleaned(robot.map().0?)?;
+        Some(Self { source: Source::Scans(robot.slam_map_mut()?), map })
+    }
+
+    /// A robot that has sent its map; none if that is invalid or has no walls.
+    fn of_map(map: &SnapshotMap) -> Option<Self> {
+        let map = cleaned(map.clone())?;
+        let walls = WallMap::new(&Grid { geometry: map.geometry, cells: &map.cells }, NORMAL_RADIUS);
+        let point = |(place, normal): (&Point2, &Vector2<f64>)| ScanPoint {
+            place: *place,
+            normal: Some(*normal).filter(|normal| *normal != Vector2::zeros()),
+        };
+        let points = walls.walls.points().iter().zip(&walls.normals).map(point);
+        (!walls.normals.is_empty()).then(|| Self { source: Source::Recorded(recorded_map(points)), map })
+    }
+
+    fn trajectory(&self) -> &Trajectory {
+        match &self.source {
+            Source::Scans(slam) => slam.trajectory(),
+            Source::Recorded(trajectory) => trajectory,
+        }
+    }
+
+    /// Pose of the frame of the trajectory in the map.
+    fn transform_map_trajectory(&self) -> Pose2 {
+        match &self.source {
+            Source::Scans(slam) => slam.transform_map_trajectory(),
+            Source::Recorded(_) => Pose2::identity(),
+        }
+    }
+
+    /// Positions of the lidar at the scans, in the frame of the base.
+    fn lidars(&self) -> Vec<Point2> {
+        match &self.source {
+            Source::Scans(slam) => slam.lidars(),
+            Source::Recorded(_) => Vec::new(),
+        }
+    }
+
+    fn is_recorded(&self) -> bool {
+        matches!(self.source, Source::Recorded(_))
     }
 
     fn grid(&self) -> Grid<'_> {
         Grid { geometry: self.map.geometry, cells: &self.map.cells }
     }
 
-    /// Pose of another robot's map in this one, if it is accepted.
+    /// Pose of another robot's map in this one, if it is accepted. Nothing is to be refined of two recorded maps.
     fn pose_of(&self, other: &Self) -> Option<Pose2> {
+        if self.is_recorded() && other.is_recorded() {
+            return None;
+        }
         let parameters = RegistrationParameters::default();
         let pair = PreparedPair::new(self.grid(), other.grid(), &parameters.search).ok()?;
         let decision = register(&pair, &UserKnowledge::default(), &parameters).ok()??;
         decision.refusal.is_none().then(|| decision.candidate.transform_a_b())
     }
+}
+
+/// A map without what is no wall; none if it is invalid.
+fn cleaned(mut map: SnapshotMap) -> Option<SnapshotMap> {
+    let drawn = map.cells.clone();
+    clean(&Grid::new(map.geometry, &drawn).ok()?, &MapCleanerParameters::default(), &mut map.cells);
+    Some(map)
 }
 
 /// Robots whose maps lie to each other as is known, in groups: each after the first with one before it.
@@ -89,23 +154,26 @@ fn refine_group(group: &[Member], robots: &mut [MappedRobot<'_>], parameters: &S
         return 0;
     }
     let framed = |Member { robot, frame }: &Member| {
-        let slam = &robots[*robot].slam;
-        FramedTrajectory { trajectory: slam.trajectory(), frame: frame * slam.transform_map_trajectory() }
+        let robot = &robots[*robot];
+        FramedTrajectory { trajectory: robot.trajectory(), frame: frame * robot.transform_map_trajectory() }
     };
     let poses = joint_poses(&group.iter().map(framed).collect::<Vec<_>>());
     let joined = group.iter().zip(poses).filter_map(|(member, poses)| Some((member.robot, poses?)));
     let joined: Vec<(usize, Vec<Pose2>)> = joined.collect();
-    let lidars: Vec<Vec<Point2>> = joined.iter().map(|(robot, _)| robots[*robot].slam.lidars()).collect();
+    let lidars: Vec<Vec<Point2>> = joined.iter().map(|(robot, _)| robots[*robot].lidars()).collect();
     let placed = joined.iter().zip(&lidars);
-    let placed = placed.map(|((robot, poses), lidars)| (robots[*robot].slam.trajectory(), &poses[..], &lidars[..]));
+    let placed = placed.map(|((robot, poses), lidars)| (robots[*robot].trajectory(), &poses[..], &lidars[..]));
     let found = joint_contradictions(&placed.collect::<Vec<_>>());
     let is_right = found.contradicting.len() as f64 <= parameters.max_contradicting * found.revisiting as f64;
     if joined.len() < 2 || !is_right {
         return 0;
     }
-    let count = joined.len();
+    let mut count = 0;
     for (robot, poses) in joined {
-        robots[robot].slam.move_to(poses);
+        if let Source::Scans(slam) = &mut robots[robot].source {
+            slam.move_to(poses);
+            count += 1;
+        }
     }
     count
 }

@@ -24,6 +24,7 @@ mod beams;
 mod continuous_odometry;
 mod joint_refinement;
 mod parameters;
+mod reasons;
 mod robot;
 mod scan_map;
 mod scan_odometry;

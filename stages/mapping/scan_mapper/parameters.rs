@@ -76,7 +76,7 @@ pub struct ScanMapperParameters {
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 10))]
     pub sighting_stddev: f64,
     /// Whether, at the end, the scans of robots whose maps are merged without doubt are refined together in one pose
-    /// graph: what one robot saw then straightens the map of another.
+    /// graph: what one robot saw, or a map that it has sent, then straightens the map of another.
     pub joint_refinement: bool,
 }
 

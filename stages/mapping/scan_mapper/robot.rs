@@ -241,7 +241,7 @@ impl Robot {
                 if slam.lost_way().is_some() {
                     continue;
                 }
-                let scan = without_motion(&scan, |delay| Some(odometry.motion(delay)));
+                let scan = scan.without_motion(|delay| Some(odometry.motion(delay)));
                 let at = odometry.pose(time, &scan, slam, parameters);
                 self.kept_odometry.push((time, at));
                 self.odometry.add(time, position(&at));
@@ -358,7 +358,7 @@ fn add_to_slam(
     let Some(start) = pose_at(odometry, time, parameters) else { return ScanOutcome::NoPose };
     // The relative poses of the beams of one scan are those of odometry.
     let still =
-        || without_motion(scan, |delay| Some(start.inv_mul(&pose_at(odometry, time.plus_seconds(delay), parameters)?)));
+        || scan.without_motion(|delay| Some(start.inv_mul(&pose_at(odometry, time.plus_seconds(delay), parameters)?)));
     let pause = blind.filter(|(end, _)| *end <= time && slam.last_time().is_some_and(|last| last < *end));
     if let Some((end, pause)) = pause
         && !slam
@@ -371,25 +371,6 @@ fn add_to_slam(
         return ScanOutcome::Used;
     }
     if slam.add(time, &start, &still()) { ScanOutcome::Used } else { ScanOutcome::NotMatched }
-}
-
-/// The scan of a robot that stands still where it is at the first beam; `moved(delay)` is where it really is that many
-/// seconds later, relative to there.
-fn without_motion(scan: &ScanBeams, moved: impl Fn(f64) -> Option<Pose2>) -> ScanBeams {
-    let mut still = scan.clone();
-    if scan.duration == 0.0 {
-        return still;
-    }
-    let transform_lidar_base = scan.transform_base_lidar.inverse();
-    for beam in &mut still.beams {
-        let Some(base) = moved(beam.delay) else { continue };
-        let (sine, cosine) = beam.angle.sin_cos();
-        let end = Point2::new(cosine * beam.range, sine * beam.range);
-        let end = transform_lidar_base * (base * (scan.transform_base_lidar * end));
-        (beam.angle, beam.range, beam.delay) = (end.y.atan2(end.x), end.coords.norm(), 0.0);
-    }
-    still.duration = 0.0;
-    still
 }
 
 fn position(pose: &Pose2) -> Position {

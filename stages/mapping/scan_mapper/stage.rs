@@ -1,11 +1,13 @@
 //! The stage `scan_mapper`.
 
 use super::joint_refinement::refine_together;
+use super::reasons::{lost_way, too_large, upside_down, why_bad};
 use super::robot::{Robot, ScanOutcome};
-use super::slam_map::{BadScans, LossCause, ScanFault, TagSighting};
+use super::slam_map::TagSighting;
 use super::{MappingMode, ScanBeams, ScanMapperParameters};
-use crate::shared::geometry::Pose2;
+use crate::shared::geometry::{GridGeometry, Pose2};
 use crate::shared::robot_clock::Leap;
+use crate::shared::scan_grid::SnapshotMap;
 use crate::tags::tag_localizer::sighting_deviation;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{
@@ -13,7 +15,7 @@ use gridweave_runtime::ros::{
 };
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
 use nalgebra::{Matrix2, Vector2};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// The stage kind `scan_mapper`.
 pub fn kind() -> StageKind {
@@ -22,7 +24,7 @@ pub fn kind() -> StageKind {
         "Builds the maps of robots from the scans of their lidars, for robots without maps: at the poses of a localizer, or, with \
          odometry only, of a SLAM with loop closures.",
         |parameters: ScanMapperParameters, _| {
-            Ok(ScanMapper { parameters, robots: BTreeMap::new(), with_map: BTreeSet::new() })
+            Ok(ScanMapper { parameters, robots: BTreeMap::new(), recorded: BTreeMap::new() })
         },
     )
     .optional_input("pose", "poses of the robots in their maps", ScanMapper::receive_pose)
@@ -43,15 +45,11 @@ const SCANS_OF_A_DRIVE: usize = 50;
 /// Error of the ways of odometry that is worth a warning, as a share.
 const ODOMETRY_ERROR: f64 = 0.05;
 
-/// How to use what a robot saw before and after it lost its way.
-const CUT_THERE: &str =
-    "cut the log there (`gridweave filter` with --end and --start), and merge both parts as two robots";
-
 struct ScanMapper {
     parameters: ScanMapperParameters,
     robots: BTreeMap<String, Robot>,
-    /// The robots that have sent a map of their own.
-    with_map: BTreeSet<String>,
+    /// The last maps of robots that have sent maps of their own.
+    recorded: BTreeMap<String, SnapshotMap>,
 }
 
 struct Drawn {
@@ -166,10 +164,10 @@ impl ScanMapper {
         output: &Output<Drawn>,
     ) -> Result<(), StageError> {
         let name = message.robot();
-        if self.with_map.contains(name) {
+        let map = SnapshotMap { geometry: GridGeometry::from(&message.info), cells: message.cells().to_vec() };
+        if self.recorded.insert(name.to_owned(), map).is_some() {
             return Ok(());
         }
-        self.with_map.insert(name.to_owned());
         if self.robots.remove(name).is_some_and(|robot| robot.sent_until.is_some()) {
             output.warn(format!(
                 "{name} has sent a map after one was built from its scans: from then on its own map is used. Results from the \
@@ -185,7 +183,7 @@ impl ScanMapper {
             output.warn("scans and poses without a robot are left out");
             return None;
         }
-        if self.with_map.contains(name) {
+        if self.recorded.contains_key(name) {
             return None;
         }
         Some(self.robots.entry(name.to_owned()).or_insert_with(Robot::new))
@@ -262,7 +260,7 @@ impl ScanMapper {
             self.draw(name, true, output);
         }
         if self.parameters.joint_refinement {
-            let count = refine_together(&mut self.robots, &self.parameters);
+            let count = refine_together(&mut self.robots, &self.recorded, &self.parameters);
             output.count("robots refined together", count as u64);
         }
         for name in names {
@@ -272,22 +270,6 @@ impl ScanMapper {
             }
         }
         Ok(())
-    }
-}
-
-/// Why a map is not trusted, because of scans of which the first is `since` seconds after the first of all.
-fn why_bad(bad: &BadScans, since: f64) -> String {
-    let BadScans { count, scans, .. } = bad;
-    match bad.fault {
-        ScanFault::Unmatched => format!(
-            "{count} of {scans} scans lie on none of its others, the first of them {since:.1} s after its first scan. Its odometry \
-             or its scans may be wrong"
-        ),
-        ScanFault::Contradicting => format!(
-            "{count} of {scans} scans that see walls again look through them, the first of them {since:.1} s after its first scan, as \
-             where a map is bent or doubled. To use it, record better odometry, or {CUT_THERE}. To see the map, give \
-             --set mapper.max_contradicting=1"
-        ),
     }
 }
 
@@ -331,14 +313,6 @@ fn explain(
     Ok(())
 }
 
-/// Why the map of a robot would be mirrored.
-fn upside_down(name: &str) -> String {
-    format!(
-        "its scans turn against its odometry, as those of a lidar that is mounted upside down. Log its mount on /tf_static \
-         with a roll of 180 degrees, or give it: --lidar {name}=X,Y,YAW,3.1416"
-    )
-}
-
 /// Sends the reason why a robot has no map.
 fn send_lost(name: &str, reason: &str, output: &Output<Drawn>) -> Result<(), StageError> {
     output.warn(format!("no map of {name}: {reason}"));
@@ -370,28 +344,6 @@ fn send_pose(
     let Some(pose) = robot.in_map(time, odometry) else { return Ok(()) };
     let header = Header::new(time, map_frame(name, robot));
     output.pose.send(name, &PoseStamped { header, pose: pose.into() }.into())
-}
-
-fn lost_way(name: &str, seconds: f64, cause: LossCause) -> String {
-    let (why, cure) = match cause {
-        LossCause::Pause(pause) => (
-            format!("nothing shows how it moved in the {pause:.1} s before, and its scans lie on no earlier ones"),
-            CUT_THERE.to_owned(),
-        ),
-        LossCause::ParallelWalls => (
-            "it has no odometry, and its scans do not show how it moved along walls that are bare and parallel"
-                .to_owned(),
-            format!("record its odometry, or {CUT_THERE}"),
-        ),
-    };
-    format!(
-        "{name} has lost its way {seconds:.1} s after its first scan: {why}. What it saw from there on is left out of its map. To use \
-         it, {cure}"
-    )
-}
-
-fn too_large(name: &str) -> String {
-    format!("scans of {name} were left out: its map would get too large")
 }
 
 /// Frame of a robot's map: that of its poses, or else the usual one.

@@ -41,8 +41,8 @@ pub(super) struct PlacedScan<'a> {
     pub(super) points: &'a [ScanPoint],
     /// Pose of the base.
     pub(super) pose: Pose2,
-    /// Position of the lidar in the frame of the base.
-    pub(super) lidar: Point2,
+    /// Position of the lidar in the frame of the base; none of what is part of a recorded map.
+    pub(super) lidar: Option<Point2>,
     /// Number of the drive of which it is part.
     pub(super) drive: usize,
 }
@@ -89,7 +89,7 @@ impl<'a> Walls<'a> {
     /// Whether the beams of a scan pass through walls of other times; `None` if too few meet any.
     fn is_contradicted(&self, number: usize) -> Option<bool> {
         let scan = &self.scans[number];
-        let lidar = scan.pose * scan.lidar;
+        let lidar = scan.pose * scan.lidar?;
         let (mut passing, mut meeting) = (0, 0);
         for point in scan.points.iter().step_by(scan.points.len().div_ceil(BEAMS).max(1)) {
             let end = scan.pose * point.place;
@@ -101,8 +101,8 @@ impl<'a> Walls<'a> {
         (meeting >= LEAST_BEAMS).then_some(passing as f64 > MAX_PASSING * meeting as f64)
     }
 
-    /// Whether a beam passes through a wall of other times that two scans have seen: what only one has seen may have been
-    /// a person.
+    /// Whether a beam passes through a wall of other times that is recorded, or that two scans have seen: what only one has
+    /// seen may have been a person.
     fn is_passed(&self, number: usize, lidar: &Point2, end: &Point2) -> bool {
         let way = end - lidar;
         let range = way.norm();
@@ -116,7 +116,8 @@ impl<'a> Walls<'a> {
                 if !self.are_apart(*scan, number) || normal.dot(&along).abs() < LEAST_COSINE {
                     continue;
                 }
-                if witness.is_some_and(|witness| witness != *scan) {
+                let is_recorded = self.scans[*scan].lidar.is_none();
+                if is_recorded || witness.is_some_and(|witness| witness != *scan) {
                     return true;
                 }
                 witness = Some(*scan);

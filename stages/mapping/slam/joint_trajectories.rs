@@ -6,7 +6,7 @@
 //! pose graphs for robust cooperative mapping"; as in Cartographer, all trajectories are nodes of one graph).
 
 use super::contradictions::{Contradictions, find_contradictions};
-use super::loop_closure::{Revisit, find_closures};
+use super::loop_closure::{Drive, Revisit, find_closures};
 use super::pose_graph::{Constraint, LandmarkSighting, PoseGraph};
 use super::revisits::refine;
 use super::scan_points::ScanPoint;
@@ -36,7 +36,7 @@ struct JointTrajectories<'a> {
     graph: PoseGraph,
     scans: Vec<&'a [ScanPoint]>,
     submaps: Vec<Range<usize>>,
-    drives: Vec<Range<usize>>,
+    drives: Vec<Drive>,
     /// Numbers of the tags that any robot saw.
     landmarks: BTreeMap<&'a str, usize>,
 }
@@ -51,7 +51,8 @@ pub fn joint_poses(robots: &[FramedTrajectory<'_>]) -> Vec<Option<Vec<Pose2>>> {
 }
 
 /// Compares each scan with the walls that other robots saw, and with those that its own robot saw at other times. For
-/// each robot the poses of the scans in the common frame, and the positions of the lidar in the frame of the base.
+/// each robot the poses of the scans in the common frame, and the positions of the lidar in the frame of the base; none for a
+/// recorded map.
 pub fn joint_contradictions(robots: &[(&Trajectory, &[Pose2], &[Point2])]) -> Contradictions {
     let placed = robots.iter().enumerate();
     let placed = placed.flat_map(|(drive, (trajectory, poses, lidars))| trajectory.placed_scans(poses, lidars, drive));
@@ -74,7 +75,7 @@ impl<'a> JointTrajectories<'a> {
         self.scans.extend(trajectory.scans());
         self.submaps.extend(trajectory.submaps().iter().map(moved));
         let drive = first..self.scans.len();
-        self.drives.push(drive.clone());
+        self.drives.push(Drive { scans: drive.clone(), is_recorded: trajectory.is_recorded() });
         if first == 0 {
             self.add_sightings(trajectory, first);
             return Some(drive);

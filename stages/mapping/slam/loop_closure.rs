@@ -31,6 +31,16 @@ const OTHER_PLACE: [f64; 2] = [0.5, 0.15];
 /// Share of the information of a registration that a closure has: the submaps are bent themselves.
 const INFORMATION_SHARE: f64 = 0.3;
 
+/// Distance of the squares of a recorded map that are part of the map around one, metres: what a lidar sees from there.
+const RECORDED_AROUND: f64 = 14.0;
+
+/// The scans of one robot, which follow each other in time, or the squares of a recorded map.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Drive {
+    pub(super) scans: Range<usize>,
+    pub(super) is_recorded: bool,
+}
+
 /// A submap that has just been finished, which may be where the robot was before.
 pub(super) struct Revisit<'a> {
     pub(super) graph: &'a PoseGraph,
@@ -38,8 +48,8 @@ pub(super) struct Revisit<'a> {
     pub(super) scans: &'a [&'a [ScanPoint]],
     /// The submaps, as ranges of scans; the last is the one that is looked for.
     pub(super) submaps: &'a [Range<usize>],
-    /// The scans of each drive, which follow each other in time.
-    pub(super) drives: &'a [Range<usize>],
+    /// The drives of which the scans are, one after the other.
+    pub(super) drives: &'a [Drive],
     /// First scan of the local map: what is in it is registered already.
     pub(super) recent: usize,
 }
@@ -86,9 +96,9 @@ pub(super) fn middle(scans: &Range<usize>) -> usize {
 }
 
 impl Revisit<'_> {
-    /// Number of the drive of a scan.
-    pub(super) fn drive(&self, scan: usize) -> usize {
-        self.drives.partition_point(|drive| drive.end <= scan)
+    /// The drive of a scan.
+    pub(super) fn drive(&self, scan: usize) -> &Drive {
+        &self.drives[self.drives.partition_point(|drive| drive.scans.end <= scan)]
     }
 
     /// Points of a submap in the frame of its middle scan.
@@ -106,24 +116,29 @@ impl Revisit<'_> {
     }
 
     /// The scans before `until` of a submap and of those before and after it on the same drive, as a later one need not
-    /// begin where it did.
-    pub(super) fn scans_around(&self, submap: usize, until: usize) -> Range<usize> {
+    /// begin where it did; of a recorded map those around it.
+    pub(super) fn scans_around(&self, submap: usize, until: usize) -> Vec<usize> {
         let own = &self.submaps[submap];
         let drive = self.drive(own.start);
+        if drive.is_recorded {
+            let at = |scan: usize| self.graph.poses[scan].translation.vector;
+            let is_near = |scan: &usize| (at(*scan) - at(own.start)).norm() <= RECORDED_AROUND;
+            return drive.scans.clone().filter(is_near).collect();
+        }
         let beside = |other: Option<usize>| {
             let other = self.submaps.get(other?)?;
-            (self.drive(other.start) == drive && other.end <= until).then_some(other)
+            (drive.scans.contains(&other.start) && other.end <= until).then_some(other)
         };
         let first = beside(submap.checked_sub(1)).map_or(own.start, |before| before.start);
         let last = beside(submap.checked_add(1)).map_or(own.end, |after| after.end);
-        first..last
+        (first..last).collect()
     }
 
     /// The walls of scans at their poses in the frame of one of them.
-    pub(super) fn map_of(&self, scans: Range<usize>, frame: usize) -> LocalMap {
+    pub(super) fn map_of(&self, scans: &[usize], frame: usize) -> LocalMap {
         let poses = &self.graph.poses;
         let into = poses[frame].inverse();
-        LocalMap::new(scans.map(|scan| (into * poses[scan], self.scans[scan])))
+        LocalMap::new(scans.iter().map(|scan| (into * poses[*scan], self.scans[*scan])))
     }
 
     /// Looks for the points of the scan `centre` and those around it in an earlier submap. `covariance` is that of
@@ -138,7 +153,7 @@ impl Revisit<'_> {
         let poses = &self.graph.poses;
         let at = middle(&self.submaps[other]);
         let deviations = [(covariance.m11 + covariance.m22).sqrt(), covariance.m33.sqrt()];
-        let map = self.map_of(self.scans_around(other, self.recent), at);
+        let map = self.map_of(&self.scans_around(other, self.recent), at);
         let mean = poses[at].inv_mul(&poses[centre]);
         let half = |axis: usize| (WINDOW * deviations[axis]).clamp(LEAST_WINDOW[axis], LARGEST_WINDOW[axis]);
         let window = [half(0), half(0), half(1)];

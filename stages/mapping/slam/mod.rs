@@ -6,7 +6,7 @@
 //! and bound on a likelihood field; what fits, and fits nowhere else, becomes a loop closure. Scans are the nodes of a
 //! pose graph, whose most likely poses are solved for after each closure, with a robust weight for closures. At the end
 //! each scan is registered on what was seen at its place at other times, by any of the robots whose relative poses are known
-//! ([`joint_poses`]).
+//! ([`joint_poses`]), or on a [recorded map](recorded_map). Tags that are seen are landmarks of the graph.
 //!
 //! The division into a local registration and submaps that are searched for loop closures by branch and bound is that
 //! of Cartographer (Hess et al. 2016, "Real-time loop closure in 2D LIDAR SLAM"); a local map of the last scans, and a
@@ -22,6 +22,7 @@ mod local_map;
 mod loop_closure;
 mod odometry_noise;
 mod pose_graph;
+mod recorded_map;
 mod revisits;
 mod scan_points;
 mod scan_registration;
@@ -34,5 +35,6 @@ pub use joint_trajectories::{FramedTrajectory, joint_contradictions, joint_poses
 pub use local_map::LocalMap;
 pub use odometry_noise::OdometryNoise;
 pub use pose_graph::{Constraint, PoseGraph};
+pub use recorded_map::recorded_map;
 pub use scan_points::{ScanPoint, scan_points};
 pub use trajectory::{LocatedScan, Trajectory};

@@ -5,7 +5,7 @@
 //! scan alignment for environment mapping").
 
 use super::local_map::LocalMap;
-use super::loop_closure::{Revisit, middle};
+use super::loop_closure::{Drive, Revisit, middle};
 use super::pose_graph::{Constraint, PoseGraph};
 use super::scan_points::ScanPoint;
 use crate::shared::geometry::Pose2;
@@ -43,14 +43,14 @@ struct SubmapMatches {
 }
 
 /// Registers each scan on what was seen at its place at other times, and moves all to the most likely poses, until they
-/// stay. Scans of one drive of `drives`, which are ranges of scans as `submaps` are, see the same place at other times
-/// if they are at least `apart` scans from each other; those of different drives always do. Returns whether any scan
+/// stay. Scans of one drive see the same place at other times if they are at least `apart` scans from each other; those
+/// of different drives always do. Returns whether any scan
 /// lies on others.
 pub(super) fn refine(
     graph: &mut PoseGraph,
     scans: &[&[ScanPoint]],
     submaps: &[Range<usize>],
-    drives: &[Range<usize>],
+    drives: &[Drive],
     apart: usize,
 ) -> bool {
     let known = graph.constraints.len();
@@ -106,12 +106,12 @@ impl SubmapMatches {
         let from = middle(&revisit.submaps[submap]);
         let into = poses[from].inverse();
         let around = revisit.scans_around(submap, revisit.scans.len());
-        let shape = around.clone().map(|scan| into * poses[scan]);
+        let shape = around.iter().map(|scan| into * poses[*scan]);
         let is_same = self.shape.len() == around.len() && self.shape.iter().zip(shape.clone()).all(is_unmoved);
         if !is_same {
             *self = Self { shape: shape.collect(), matches: BTreeMap::new() };
         }
-        let map = LazyCell::new(|| revisit.map_of(around, from));
+        let map = LazyCell::new(|| revisit.map_of(&around, from));
         for scan in scans {
             let known = into * poses[scan];
             if !self.matches.get(&scan).is_some_and(|(before, _)| is_unmoved((before, known))) {
@@ -131,11 +131,15 @@ fn is_unmoved((before, now): (&Pose2, Pose2)) -> bool {
 fn near_submaps(revisit: &Revisit<'_>, scan: usize, apart: usize) -> Vec<usize> {
     let poses = &revisit.graph.poses;
     let here = poses[scan].translation.vector;
+    let drive = revisit.drive(scan);
+    // Scans are registered on a recorded map, and it not on them.
+    if drive.is_recorded {
+        return Vec::new();
+    }
     let distance = |submap: usize| (poses[middle(&revisit.submaps[submap])].translation.vector - here).norm();
     let is_of_other_time = |submap: &usize| {
         let scans = &revisit.submaps[*submap];
-        let is_of_other_drive = revisit.drive(scans.start) != revisit.drive(scan);
-        is_of_other_drive || scans.end + apart <= scan || scan + apart < scans.start
+        !drive.scans.contains(&scans.start) || scans.end + apart <= scan || scan + apart < scans.start
     };
     let of_other_time = (0..revisit.submaps.len()).filter(is_of_other_time).map(|submap| (distance(submap), submap));
     let mut near: Vec<(f64, usize)> = of_other_time.filter(|(distance, _)| *distance <= COMMON_DISTANCE).collect();

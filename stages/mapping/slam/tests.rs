@@ -1,7 +1,7 @@
 //! Drives through a building whose walls are known, with odometry that drifts.
 
 use super::contradictions::{PlacedScan, find_contradictions};
-use super::{FramedTrajectory, ScanPoint, Trajectory, joint_contradictions, joint_poses, scan_points};
+use super::{FramedTrajectory, ScanPoint, Trajectory, joint_contradictions, joint_poses, recorded_map, scan_points};
 use crate::shared::geometry::{Point2, Pose2, pose};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -156,7 +156,7 @@ fn scans_contradict_walls_that_were_drawn_elsewhere() {
         let mut placed = Vec::new();
         for (scan, (points, at)) in scans.iter().zip(&truth).enumerate() {
             let by = if scan < again { 0.0 } else { moved };
-            placed.push(PlacedScan { points, pose: pose(0.0, by, 0.0) * at, lidar: Point2::origin(), drive: 0 });
+            placed.push(PlacedScan { points, pose: pose(0.0, by, 0.0) * at, lidar: Some(Point2::origin()), drive: 0 });
         }
         find_contradictions(&placed, 40)
     };
@@ -167,7 +167,7 @@ fn scans_contradict_walls_that_were_drawn_elsewhere() {
     let is_along_it = |scan: &usize| *scan < 45 || *scan >= again;
     assert!(doubled.contradicting.len() > 50 && doubled.contradicting.iter().all(is_along_it), "{doubled:?}");
     let alone = scans.iter().zip(&truth).take(30);
-    let alone = alone.map(|(points, pose)| PlacedScan { points, pose: *pose, lidar: Point2::origin(), drive: 0 });
+    let alone = alone.map(|(points, pose)| PlacedScan { points, pose: *pose, lidar: Some(Point2::origin()), drive: 0 });
     assert_eq!(find_contradictions(&alone.collect::<Vec<_>>(), 40).revisiting, 0);
 }
 
@@ -254,4 +254,42 @@ fn tags_that_are_seen_again_close_a_loop_where_scans_show_nothing() {
     let after = error(trajectory.poses(), &truth);
     assert!(closed_on_the_way, "a map on the way has the loop, too");
     assert!(before > 1.0 && after < 0.3 * before, "{before} m before, {after} m after");
+}
+
+#[test]
+fn scans_are_straightened_by_a_recorded_map_which_stays_as_it_is() {
+    let (walls, truth) = (walls(), drive());
+    let half = &truth[truth.len() / 4..truth.len() * 3 / 4];
+    let mut open = driven(&walls, half, 2.0, 8);
+    let alone = error(open.poses(), half);
+    // Points of the walls on both sides, in the frame of the building.
+    let mut points = Vec::new();
+    for [from, to] in &walls {
+        let way = to - from;
+        let normal = nalgebra::Vector2::new(way.y, -way.x).normalize();
+        let steps = (way.norm() / 0.05) as usize;
+        for step in 0..steps {
+            let place = from + way * (step as f64 / steps as f64);
+            points.extend([normal, -normal].map(|normal| ScanPoint { place, normal: Some(normal) }));
+        }
+    }
+    let recorded = recorded_map(points.into_iter());
+    let map = FramedTrajectory { trajectory: &recorded, frame: Pose2::identity() };
+    let robot = FramedTrajectory { trajectory: &open, frame: half[0] * pose(0.2, 0.1, -0.02) };
+    let found = joint_poses(&[map, robot]);
+    let [Some(squares), Some(together)] = &found[..] else { panic!("{found:?}") };
+    for (before, after) in recorded.poses().iter().zip(squares) {
+        let off = before.inv_mul(after);
+        assert!(off.translation.vector.norm() < 2e-3 && off.rotation.angle().abs() < 2e-3, "{off}");
+    }
+    let lidars = vec![Point2::origin(); half.len()];
+    let contradicting = |by: f64| {
+        let moved: Vec<Pose2> = together.iter().map(|at| pose(0.0, by, 0.0) * at).collect();
+        joint_contradictions(&[(&recorded, squares, &[]), (&open, &moved, &lidars)]).contradicting.len()
+    };
+    assert_eq!(contradicting(0.0), 0);
+    assert!(contradicting(0.6) > 10, "{}", contradicting(0.6));
+    open.move_to(together.clone());
+    let after = error(open.poses(), half);
+    assert!(after < 0.5 * alone, "{alone} m alone, and {after} m on the map");
 }

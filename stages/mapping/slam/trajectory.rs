@@ -2,7 +2,7 @@
 
 use super::contradictions::{Contradictions, PlacedScan, find_contradictions};
 use super::local_map::LocalMap;
-use super::loop_closure::{Revisit, find_loop_closures};
+use super::loop_closure::{Drive, Revisit, find_loop_closures};
 use super::odometry_noise::OdometryNoise;
 use super::pose_graph::{Constraint, LandmarkSighting, PoseGraph, turned_information};
 use super::revisits::refine;
@@ -68,6 +68,7 @@ pub struct Trajectory {
     submap_start: usize,
     /// Earlier submaps that are part of the local map.
     revisited: Vec<usize>,
+    is_recorded: bool,
     /// The tags that were seen.
     tags: BTreeMap<String, SeenTag>,
     /// The local map, once it was asked for since the last change.
@@ -87,15 +88,41 @@ impl Trajectory {
             submaps: Vec::new(),
             submap_start: 0,
             revisited: Vec::new(),
+            is_recorded: false,
             tags: BTreeMap::new(),
             local_map: OnceCell::new(),
             unmatched: 0,
         }
     }
 
+    /// The squares of a recorded map as scans at known poses, each of which is a submap.
+    pub(super) fn of_recorded_map(graph: PoseGraph, scans: Vec<Vec<ScanPoint>>) -> Self {
+        let count = scans.len();
+        let submaps = (0..count).map(|scan| scan..scan + 1).collect();
+        Self {
+            graph,
+            scans,
+            paths: vec![0.0; count],
+            submaps,
+            submap_start: count,
+            is_recorded: true,
+            ..Self::new(1.0)
+        }
+    }
+
     /// The poses of the base at the scans.
     pub fn poses(&self) -> &[Pose2] {
         &self.graph.poses
+    }
+
+    /// All of its scans.
+    fn drive(&self) -> Drive {
+        Drive { scans: 0..self.scans.len(), is_recorded: self.is_recorded }
+    }
+
+    /// Whether it is a recorded map.
+    pub(super) fn is_recorded(&self) -> bool {
+        self.is_recorded
     }
 
     /// The points of each scan, in the frame of the base.
@@ -149,15 +176,20 @@ impl Trajectory {
         find_contradictions(&self.placed_scans(&self.graph.poses, lidars, 0).collect::<Vec<_>>(), RECENT_SCANS)
     }
 
-    /// The scans at poses that need not be those of the graph, as of the given drive.
+    /// The scans at poses that need not be those of the graph, as of the given drive. There are no lidars of a recorded map.
     pub(super) fn placed_scans<'a>(
         &'a self,
         poses: &'a [Pose2],
         lidars: &'a [Point2],
         drive: usize,
     ) -> impl Iterator<Item = PlacedScan<'a>> {
-        let scans = self.scans.iter().zip(poses).zip(lidars);
-        scans.map(move |((points, pose), lidar)| PlacedScan { points, pose: *pose, lidar: *lidar, drive })
+        let scans = self.scans.iter().zip(poses).enumerate();
+        scans.map(move |(scan, (points, pose))| PlacedScan {
+            points,
+            pose: *pose,
+            lidar: lidars.get(scan).copied(),
+            drive,
+        })
     }
 
     /// Moves the scans to poses in any frame; those of the first submap stay where they are as a whole.
@@ -275,7 +307,7 @@ impl Trajectory {
         if has_seen_again {
             self.graph.optimize();
         }
-        let (drive, scans) = (0..self.scans.len(), self.scans().collect::<Vec<_>>());
+        let (drive, scans) = (self.drive(), self.scans().collect::<Vec<_>>());
         let drives = slice::from_ref(&drive);
         let revisit = Revisit { graph: &self.graph, scans: &scans, submaps: &self.submaps, drives, recent };
         let found = find_loop_closures(&revisit);
@@ -295,7 +327,7 @@ impl Trajectory {
         let has_closed = self.finish_submap();
         let start = self.start();
         let scans: Vec<&[ScanPoint]> = self.scans.iter().map(Vec::as_slice).collect();
-        let drive = 0..scans.len();
+        let drive = self.drive();
         let has_moved = refine(&mut self.graph, &scans, &self.submaps, slice::from_ref(&drive), RECENT_SCANS);
         self.hold(&start);
         self.local_map.take();
