@@ -24,7 +24,7 @@ enum Source<'a> {
     /// It is drawn of its scans.
     Scans(&'a mut SlamMap),
     /// The robot has sent it.
-    Recorded(Trajectory),
+    Recorded(Box<Trajectory>),
 }
 
 /// A robot of a group, and the pose of its map frame in that of the first.
@@ -71,7 +71,7 @@ impl<'a> MappedRobot<'a> {
             normal: Some(*normal).filter(|normal| *normal != Vector2::zeros()),
         };
         let points = walls.walls.points().iter().zip(&walls.normals).map(point);
-        (!walls.normals.is_empty()).then(|| Self { source: Source::Recorded(recorded_map(points)), map })
+        (!walls.normals.is_empty()).then(|| Self { source: Source::Recorded(Box::new(recorded_map(points))), map })
     }
 
     fn trajectory(&self) -> &Trajectory {
