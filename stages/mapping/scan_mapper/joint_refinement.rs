@@ -170,9 +170,14 @@ fn refine_group(group: &[Member], robots: &mut [MappedRobot<'_>], parameters: &S
     }
     let mut count = 0;
     for (robot, poses) in joined {
-        if let Source::Scans(slam) = &mut robots[robot].source {
-            slam.move_to(poses);
-            count += 1;
+        let Source::Scans(slam) = &mut robots[robot].source else { continue };
+        let alone = slam.trajectory().poses().to_vec();
+        slam.move_to(poses);
+        slam.test(true);
+        // Of a few scans among many of others all may contradict each other.
+        match slam.bad_scans() {
+            Some(_) => slam.move_to(alone),
+            None => count += 1,
         }
     }
     count
