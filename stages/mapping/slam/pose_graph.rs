@@ -11,8 +11,9 @@ use std::collections::BinaryHeap;
 const MAX_STEPS: usize = 60;
 /// Factor by which the weights narrow from step to step.
 const NARROWING: f64 = 2.0;
-/// Steps shorter than this end the iteration, metres and radians.
+/// Steps shorter than this end the iteration, metres and radians; and those where measurements are made anew after it.
 const LEAST_STEP: f64 = 1e-4;
+const LEAST_SETTLING_STEP: f64 = 1e-3;
 /// Prior of each pose about where it was before a step, in standard deviations of a hundred metres or radians: the
 /// first pose is fixed by it alone where nothing else fixes it.
 const DAMPING: f64 = 1e-4;
@@ -100,6 +101,15 @@ impl PoseGraph {
     /// are wide at first, so that those of a long drive are not taken for wrong ones, and narrow with the steps
     /// (graduated non-convexity, Yang et al. 2020).
     pub fn optimize(&mut self) {
+        self.iterate(true);
+    }
+
+    /// The same for poses that are near the minimum, to a millimetre: the weights are narrow from the first step on.
+    pub fn settle(&mut self) {
+        self.iterate(false);
+    }
+
+    fn iterate(&mut self, is_graduated: bool) {
         let count = self.poses.len();
         let mut nodes = self.poses.clone();
         let landmarks = self.sightings.iter().map(|sighting| sighting.landmark + 1).max().unwrap_or(0);
@@ -112,7 +122,10 @@ impl PoseGraph {
         let constraints: Vec<Constraint> = self.constraints.iter().copied().chain(sightings).collect();
         let loops = constraints.iter().filter(|constraint| constraint.is_loop);
         let largest = loops.map(|constraint| constraint.squared_residual(&nodes)).fold(0.0, f64::max);
-        let mut width = (2.0 * largest / ROBUST).max(1.0);
+        let (mut width, least_step) = match is_graduated {
+            true => ((2.0 * largest / ROBUST).max(1.0), LEAST_STEP),
+            false => (1.0, LEAST_SETTLING_STEP),
+        };
         for _ in 0..MAX_STEPS {
             let Some(moves) = step(&nodes, &constraints, width) else { break };
             let mut longest = 0.0f64;
@@ -121,7 +134,7 @@ impl PoseGraph {
                 pose.rotation *= UnitComplex::new(step.z);
                 longest = longest.max(step.amax());
             }
-            if width == 1.0 && longest < LEAST_STEP {
+            if width == 1.0 && longest < least_step {
                 break;
             }
             width = (width / NARROWING).max(1.0);

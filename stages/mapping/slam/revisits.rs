@@ -64,7 +64,12 @@ pub(super) fn refine(
         }
         graph.constraints.extend(found);
         let before = graph.poses.clone();
-        graph.optimize();
+        // The first round has moved all near to where they belong.
+        if has_moved {
+            graph.settle();
+        } else {
+            graph.optimize();
+        }
         // The next round measures them anew, where scans have moved.
         graph.constraints.truncate(known);
         has_moved = true;
