@@ -42,10 +42,13 @@ struct JointTrajectories<'a> {
 }
 
 /// Finds the most likely poses of the scans of all robots together, in the common frame. Each trajectory must have walls
-/// in common with one before it: where none of its submaps lies on theirs, it has no poses.
+/// in common with one before it: where none of its submaps lies on theirs, it has no poses. None has if no two do.
 pub fn joint_poses(robots: &[FramedTrajectory<'_>]) -> Vec<Option<Vec<Pose2>>> {
     let mut joint = JointTrajectories::default();
     let drives: Vec<Option<Range<usize>>> = robots.iter().map(|robot| joint.add(robot)).collect();
+    if joint.drives.len() < 2 {
+        return vec![None; robots.len()];
+    }
     refine(&mut joint.graph, &joint.scans, &joint.submaps, &joint.drives, RECENT_SCANS);
     drives.into_iter().map(|drive| Some(joint.graph.poses[drive?].to_vec())).collect()
 }

@@ -1,4 +1,4 @@
-//! Scans registered on what the robot saw at their place at other times, once all poses are nearly known.
+//! Scans registered on what a robot saw at their place at other times, once all poses are nearly known.
 //!
 //! A loop closure ties a submap to an earlier one by one measurement. With all poses near their places each scan is
 //! registered by itself on the submaps around it, as in the network of Lu and Milios (1997, "Globally consistent range
@@ -43,9 +43,8 @@ struct SubmapMatches {
 }
 
 /// Registers each scan on what was seen at its place at other times, and moves all to the most likely poses, until they
-/// stay. Scans of one drive see the same place at other times if they are at least `apart` scans from each other; those
-/// of different drives always do. Returns whether any scan
-/// lies on others.
+/// stay. Scans of one drive see the same place at other times if they are at least `apart` scans from each other; those of
+/// different drives always do. Returns whether any scan lies on others.
 pub(super) fn refine(
     graph: &mut PoseGraph,
     scans: &[&[ScanPoint]],

@@ -293,3 +293,27 @@ fn scans_are_straightened_by_a_recorded_map_which_stays_as_it_is() {
     let after = error(open.poses(), half);
     assert!(after < 0.5 * alone, "{alone} m alone, and {after} m on the map");
 }
+
+#[test]
+fn a_tag_that_is_seen_again_from_the_last_scan_alone_counts() {
+    let truth = drive();
+    let tag = Point2::new(3.0, 0.0);
+    let seen = |step: usize| truth[step].inverse() * tag;
+    let again = (0..truth.len()).rev().find(|step| seen(*step).coords.norm() < 2.0).unwrap();
+    let mut trajectory = Trajectory::new(0.1);
+    for (step, at) in truth.iter().enumerate().take(again + 1) {
+        let moved = truth[step.saturating_sub(1)].inv_mul(at);
+        let turn = moved.rotation.angle() + 0.006 * moved.translation.vector.norm();
+        trajectory.add(&pose(moved.translation.x, moved.translation.y, turn), Vec::new());
+        if step == 5 {
+            trajectory.see(step, "family:1", seen(step), 0.03);
+        }
+    }
+    // The submap ends with the last scan, and the sighting comes after it.
+    trajectory.finish_submap();
+    let before = error(trajectory.poses(), &truth[..=again]);
+    trajectory.see(again, "family:1", seen(again), 0.03);
+    assert!(trajectory.finish());
+    let after = error(trajectory.poses(), &truth[..=again]);
+    assert!(after < 0.7 * before, "{before} m before, {after} m after");
+}

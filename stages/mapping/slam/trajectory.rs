@@ -52,6 +52,8 @@ pub(super) struct SeenTag {
     pub(super) landmark: usize,
     /// The first and the last scan from which it was seen.
     scans: [usize; 2],
+    /// Whether it was seen again since the poses were last optimised for it.
+    is_new: bool,
 }
 
 /// The scans of a robot with their poses, in the frame of the first.
@@ -238,13 +240,13 @@ impl Trajectory {
         }
         let landmark = match self.tags.get_mut(tag) {
             Some(SeenTag { scans: [_, last], .. }) if *last >= scan => return,
-            Some(SeenTag { scans: [_, last], landmark }) => {
-                *last = scan;
+            Some(SeenTag { scans: [_, last], landmark, is_new }) => {
+                (*last, *is_new) = (scan, true);
                 *landmark
             }
             None => {
                 let landmark = self.tags.len();
-                self.tags.insert(tag.to_owned(), SeenTag { landmark, scans: [scan; 2] });
+                self.tags.insert(tag.to_owned(), SeenTag { landmark, scans: [scan; 2], is_new: false });
                 landmark
             }
         };
@@ -292,6 +294,18 @@ impl Trajectory {
         })
     }
 
+    /// Optimises the poses if a tag was seen again since the last time, that was first seen before the scan `recent`. Returns
+    /// whether one was.
+    fn close_by_tags(&mut self, recent: usize) -> bool {
+        let is_again = |tag: &SeenTag| tag.is_new && tag.scans[0] < recent;
+        let is_seen_again = self.tags.values().any(is_again);
+        self.tags.values_mut().for_each(|tag| tag.is_new = false);
+        if is_seen_again {
+            self.graph.optimize();
+        }
+        is_seen_again
+    }
+
     /// Finishes the submap of the last scans, and looks for loop closures. Returns whether one has moved earlier
     /// scans.
     pub fn finish_submap(&mut self) -> bool {
@@ -301,12 +315,8 @@ impl Trajectory {
         }
         self.submap_start = own.end;
         let recent = self.recent();
-        let is_again = |SeenTag { scans: [first, last], .. }: &SeenTag| *first < recent && own.contains(last);
-        let has_seen_again = self.tags.values().any(is_again);
         self.submaps.push(own);
-        if has_seen_again {
-            self.graph.optimize();
-        }
+        let has_seen_again = self.close_by_tags(recent);
         let (drive, scans) = (self.drive(), self.scans().collect::<Vec<_>>());
         let drives = slice::from_ref(&drive);
         let revisit = Revisit { graph: &self.graph, scans: &scans, submaps: &self.submaps, drives, recent };
@@ -324,8 +334,10 @@ impl Trajectory {
     /// Finishes the last submap, and registers each scan on what was seen at its place at other times. Returns whether
     /// scans have moved.
     pub fn finish(&mut self) -> bool {
-        let has_closed = self.finish_submap();
+        let mut has_closed = self.finish_submap();
         let start = self.start();
+        // Those seen from the last scan of a submap come after its end.
+        has_closed |= self.close_by_tags(self.recent());
         let scans: Vec<&[ScanPoint]> = self.scans.iter().map(Vec::as_slice).collect();
         let drive = self.drive();
         let has_moved = refine(&mut self.graph, &scans, &self.submaps, slice::from_ref(&drive), RECENT_SCANS);
