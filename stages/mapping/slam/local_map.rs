@@ -2,7 +2,7 @@
 
 use super::likelihood_field::LikelihoodField;
 use super::scan_points::{SPACING, ScanPoint};
-use crate::shared::geometry::{Neighbour, Point2, PointIndex, Pose2, quarter_turn};
+use crate::shared::geometry::{MovingLookup, Point2, PointIndex, Pose2, quarter_turn};
 use crate::shared::walls::{CORRELATION_LENGTH, DEVIATION, LEAST_NORMAL_AGREEMENT};
 use nalgebra::{Matrix3, Vector2, Vector3};
 use std::f64::consts::TAU;
@@ -12,8 +12,10 @@ const SURFACE_CELL: f64 = 0.1;
 /// Sectors of directions.
 const SECTORS: f64 = 12.0;
 /// Distances within which a point is matched with a surface, metres: from the search's cells down to the noise.
-const RADII: [f64; 6] = [0.3, 0.25, 0.2, LAST_RADIUS, LAST_RADIUS, LAST_RADIUS];
+const RADII: [f64; 7] = [0.3, 0.25, 0.2, LAST_RADIUS, LAST_RADIUS, LAST_RADIUS, LAST_RADIUS];
 const LAST_RADIUS: f64 = 0.15;
+/// Least share of the points of a scan, or of a submap, that lie on a map of which it has seen enough to be registered.
+const LEAST_MATCHED: f64 = 0.5;
 /// Steps at the last radius that are shorter end the iteration, metres and radians.
 const LEAST_STEP: f64 = 1e-4;
 /// Standard deviation in the weight of a match, as a share of the radius (Welsch).
@@ -93,54 +95,99 @@ impl LocalMap {
     /// Registers points on the walls: the distances of the points to the lines of the surfaces are minimised together
     /// with the deviation from a prior, with weights that fall with the distance (point to line as in Censi 2008, "An
     /// ICP variant using a point-to-line metric").
-    pub fn register(&self, scan: &[ScanPoint], guess: &Pose2, prior: Option<(&Pose2, &Matrix3<f64>)>) -> Match {
-        let mut pose = *guess;
-        let mut lookups = vec![Lookup::default(); scan.len()];
-        for radius in RADII {
-            let (mut matrix, mut vector, _) = self.equations(scan, &pose, radius, &mut lookups);
-            if let Some((mean, information)) = prior {
-                let off = Vector3::new(
-                    mean.translation.x - pose.translation.x,
-                    mean.translation.y - pose.translation.y,
-                    (mean.rotation / pose.rotation).angle(),
-                );
-                matrix += information;
-                vector += information * off;
-            }
-            // Nothing else fixes what no wall does.
-            matrix += Matrix3::identity();
-            let Some(step) = matrix.cholesky().map(|factor| factor.solve(&vector)) else { break };
-            pose.translation.vector += step.xy();
-            pose.rotation *= nalgebra::UnitComplex::new(step.z);
-            if radius == LAST_RADIUS && step.norm() < LEAST_STEP {
+    pub fn register(&self, scan: &[ScanPoint], guess: &Pose2, prior: (&Pose2, &Matrix3<f64>)) -> Match {
+        let mut registration = Registration::new(self, scan, guess, Some(prior));
+        let equations = registration.equations(RADII[0]);
+        registration.run(equations)
+    }
+
+    /// Registers points by the walls alone. `None` if fewer than [`LEAST_MATCHED`] of them lie on the map, at the end
+    /// or within the first radius of the guess: most scans that share little with the map are found out by that.
+    pub(super) fn find(&self, scan: &[ScanPoint], guess: &Pose2) -> Option<Match> {
+        let mut registration = Registration::new(self, scan, guess, None);
+        let equations = registration.equations(RADII[0]);
+        if equations.matched < LEAST_MATCHED {
+            return None;
+        }
+        let found = registration.run(equations);
+        (found.matched >= LEAST_MATCHED).then_some(found)
+    }
+}
+
+/// Points on their way to their place on a map.
+struct Registration<'a> {
+    map: &'a LocalMap,
+    scan: &'a [ScanPoint],
+    pose: Pose2,
+    prior: Option<(&'a Pose2, &'a Matrix3<f64>)>,
+    /// For each point the lookup of its nearest wall or spot.
+    lookups: Vec<MovingLookup>,
+}
+
+/// Normal equations of a small move (x, y, yaw about the points' frame).
+struct MoveEquations {
+    matrix: Matrix3<f64>,
+    vector: Vector3<f64>,
+    /// Share of the points that lie on the map.
+    matched: f64,
+}
+
+impl<'a> Registration<'a> {
+    fn new(
+        map: &'a LocalMap,
+        scan: &'a [ScanPoint],
+        guess: &Pose2,
+        prior: Option<(&'a Pose2, &'a Matrix3<f64>)>,
+    ) -> Self {
+        Self { map, scan, pose: *guess, prior, lookups: vec![MovingLookup::default(); scan.len()] }
+    }
+
+    /// Moves the points to where the equations and those after them say, the first of which are within `RADII[0]`.
+    fn run(mut self, mut equations: MoveEquations) -> Match {
+        for radii in RADII.windows(2) {
+            let Some(step) = self.step(&equations) else { break };
+            self.pose.translation.vector += step.xy();
+            self.pose.rotation *= nalgebra::UnitComplex::new(step.z);
+            equations = self.equations(radii[1]);
+            if radii[0] == LAST_RADIUS && step.norm() < LEAST_STEP {
                 break;
             }
         }
-        let (information, _, matched) = self.equations(scan, &pose, LAST_RADIUS, &mut lookups);
-        Match { pose, information, matched }
+        Match { pose: self.pose, information: equations.matrix, matched: equations.matched }
     }
 
-    /// Normal equations of a small move (x, y, yaw about the points' frame), and the share of matched points. `lookups`
-    /// has for each point what was found for it before.
-    fn equations(
-        &self,
-        scan: &[ScanPoint],
-        pose: &Pose2,
-        radius: f64,
-        lookups: &mut [Lookup],
-    ) -> (Matrix3<f64>, Vector3<f64>, f64) {
+    /// The move that fits the equations and the prior best.
+    fn step(&self, equations: &MoveEquations) -> Option<Vector3<f64>> {
+        let MoveEquations { mut matrix, mut vector, .. } = *equations;
+        if let Some((mean, information)) = self.prior {
+            let off = Vector3::new(
+                mean.translation.x - self.pose.translation.x,
+                mean.translation.y - self.pose.translation.y,
+                (mean.rotation / self.pose.rotation).angle(),
+            );
+            matrix += information;
+            vector += information * off;
+        }
+        // Nothing else fixes what no wall does.
+        matrix += Matrix3::identity();
+        Some(matrix.cholesky()?.solve(&vector))
+    }
+
+    /// The equations by the points that have a wall or a spot within `radius`.
+    fn equations(&mut self, radius: f64) -> MoveEquations {
+        let (map, pose) = (self.map, &self.pose);
         let (mut matrix, mut vector) = (Matrix3::zeros(), Vector3::zeros());
         let mut matched = 0;
         // Neighbouring points of a wall are one measurement.
         let information = SPACING / CORRELATION_LENGTH / (DEVIATION * DEVIATION);
         let width = WEIGHT_WIDTH * radius;
-        for (point, lookup) in scan.iter().zip(lookups) {
+        for (point, lookup) in self.scan.iter().zip(&mut self.lookups) {
             let arm = pose.rotation * point.place.coords;
             let place = pose.translation.vector + arm;
-            let index = if point.normal.is_some() { &self.index } else { &self.spots };
-            let Some(found) = lookup.nearest(index, place, radius) else { continue };
+            let index = if point.normal.is_some() { &map.index } else { &map.spots };
+            let Some(found) = lookup.nearest(index, &place.into(), radius) else { continue };
             let Some(normal) = point.normal else {
-                let off = self.spots.points()[found.index].coords - place;
+                let off = map.spots.points()[found.index].coords - place;
                 let weight = information * (-0.5 * off.norm_squared() / (width * width)).exp();
                 matched += 1;
                 for by in [Vector2::x(), Vector2::y()] {
@@ -150,7 +197,7 @@ impl LocalMap {
                 }
                 continue;
             };
-            let surface = &self.surfaces[found.index];
+            let surface = &map.surfaces[found.index];
             if surface.normal.dot(&(pose.rotation * normal)) < LEAST_NORMAL_AGREEMENT {
                 continue;
             }
@@ -162,38 +209,7 @@ impl LocalMap {
             matrix += weight * row * row.transpose();
             vector += weight * off * row;
         }
-        (matrix, vector, f64::from(matched) / scan.len().max(1) as f64)
-    }
-}
-
-/// What was found near a point in the round before, which is near it in the next.
-#[derive(Clone, Copy)]
-struct Lookup {
-    /// Index of the nearest.
-    nearest: usize,
-    /// A place where nothing was within a radius, metres.
-    empty: (Vector2<f64>, f64),
-}
-
-impl Default for Lookup {
-    fn default() -> Self {
-        Self { nearest: usize::MAX, empty: (Vector2::zeros(), 0.0) }
-    }
-}
-
-impl Lookup {
-    /// The nearest neighbour of a place within a radius.
-    fn nearest(&mut self, index: &PointIndex, place: Vector2<f64>, radius: f64) -> Option<Neighbour> {
-        let (empty, within) = self.empty;
-        if radius < within && (place - empty).norm() < within - radius {
-            return None;
-        }
-        let found = index.nearest_from(&place.into(), radius, self.nearest);
-        match found {
-            Some(found) => self.nearest = found.index,
-            None => self.empty = (place, radius),
-        }
-        found
+        MoveEquations { matrix, vector, matched: f64::from(matched) / self.scan.len().max(1) as f64 }
     }
 }
 
@@ -237,7 +253,7 @@ mod tests {
         let room = walls(&[[3.0, 0.0, -1.0, 0.0], [-3.0, 0.0, 1.0, 0.0], [0.0, 2.0, 0.0, -1.0]]);
         let map = LocalMap::new([(Pose2::identity(), &room[..])].into_iter());
         let truth = pose(0.11, -0.07, 0.03);
-        let found = map.register(&seen_from(&truth, &room), &Pose2::identity(), None);
+        let found = map.find(&seen_from(&truth, &room), &Pose2::identity()).unwrap();
         let off = truth.inverse() * found.pose;
         assert!(off.translation.vector.norm() < 1e-3 && off.rotation.angle().abs() < 1e-3, "{off}");
         assert!(found.matched > 0.95);
@@ -245,7 +261,7 @@ mod tests {
         // A corridor: nothing tells where along it.
         let corridor = walls(&[[0.0, 1.0, 0.0, -1.0], [0.0, -1.0, 0.0, 1.0]]);
         let map = LocalMap::new([(Pose2::identity(), &corridor[..])].into_iter());
-        let found = map.register(&corridor, &pose(0.0, 0.05, 0.0), None);
+        let found = map.find(&corridor, &pose(0.0, 0.05, 0.0)).unwrap();
         let weakest = found.information.symmetric_eigenvalues().min();
         assert!(weakest < 1e-6 * found.information.trace(), "{}", found.information);
         assert!(found.pose.translation.vector.norm() < 1e-3);
@@ -254,7 +270,6 @@ mod tests {
     #[test]
     fn the_other_face_of_a_wall_is_not_matched() {
         let map = LocalMap::new([(Pose2::identity(), &walls(&[[1.0, 0.0, -1.0, 0.0]])[..])].into_iter());
-        let found = map.register(&walls(&[[1.05, 0.0, 1.0, 0.0]]), &Pose2::identity(), None);
-        assert_eq!(found.matched, 0.0);
+        assert_eq!(map.find(&walls(&[[1.05, 0.0, 1.0, 0.0]]), &Pose2::identity()), None);
     }
 }

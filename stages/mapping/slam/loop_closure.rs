@@ -22,8 +22,6 @@ const LARGEST_WINDOW: [f64; 2] = [4.0, 0.6];
 const SEARCHED_POINTS: usize = 250;
 /// Least mean likelihood of the points at a place that is worth a registration.
 const LEAST_RESPONSE: f64 = 0.35;
-/// Least share of the points on walls of the other submap.
-const LEAST_MATCHED: f64 = 0.5;
 /// Largest likelihood of the points at another place, as a share of that at the best.
 const MAX_SECOND: f64 = 0.85;
 /// What is another place: distance, metres, and turn, radians.
@@ -163,10 +161,7 @@ impl Revisit<'_> {
         let [low, high] = reach(&searched, &mean, &window);
         let field = map.field(&low, &high);
         let found = search(&field, &searched, &prior, GAIN, LEAST_RESPONSE, None)?;
-        let fit = map.register(points, &found.pose, None);
-        if fit.matched < LEAST_MATCHED {
-            return None;
-        }
+        let fit = map.find(points, &found.pose)?;
         let excluded = Excluded { pose: found.pose, distance: OTHER_PLACE[0], turn: OTHER_PLACE[1] };
         let least = MAX_SECOND * found.response;
         if search(&field, &searched, &prior, GAIN, least, Some(&excluded)).is_some() {

@@ -18,8 +18,6 @@ use std::ops::Range;
 const COMMON_DISTANCE: f64 = 14.0;
 /// Number of submaps, the nearest ones, on which a scan is registered.
 const MAX_SUBMAPS: usize = 12;
-/// Least share of the points on walls of the submap.
-const LEAST_MATCHED: f64 = 0.5;
 /// How far a scan may move, metres and radians: what lies farther off is another wall.
 const MAX_MOVE: [f64; 2] = [0.3, 0.1];
 /// Share of the information of a registration that counts: the scans of a submap are registered on the same points.
@@ -154,10 +152,10 @@ fn near_submaps(revisit: &Revisit<'_>, scan: usize, apart: usize) -> Vec<usize> 
 /// The pose of a scan in a submap, whose frame is that of the scan `from`, as registered from a known one; `None` if the
 /// scan does not lie on it there.
 fn register_on(points: &[ScanPoint], scan: usize, from: usize, known: &Pose2, map: &LocalMap) -> Option<Constraint> {
-    let fit = map.register(points, known, None);
+    let fit = map.find(points, known)?;
     let moved = known.inv_mul(&fit.pose);
     let is_near = moved.translation.vector.norm() <= MAX_MOVE[0] && moved.rotation.angle().abs() <= MAX_MOVE[1];
-    (fit.matched >= LEAST_MATCHED && is_near).then(|| Constraint {
+    is_near.then(|| Constraint {
         from,
         to: scan,
         transform: fit.pose,

@@ -70,7 +70,7 @@ fn register_within(
     let prior = PosePrior { mean: *guess, information: *information, window };
     let found = search(&map.field(&low, &high), &searched, &prior, GAIN, 0.0, None);
     let start = found.map_or(*guess, |found| found.pose);
-    let fit = map.register(points, &start, Some((guess, information)));
+    let fit = map.register(points, &start, (guess, information));
     RegisteredScan { pose: fit.pose, information: fit.information, matched: fit.matched }
 }
 

@@ -3,7 +3,7 @@
 use super::initial_guess::LocalFrame;
 use super::normal_equations::{Measurement, NormalEquations};
 use super::{IcpParameters, InitialGuess, Metric, Weighting};
-use crate::shared::geometry::{Pose2, quarter_turn};
+use crate::shared::geometry::{MovingLookup, Pose2, quarter_turn};
 use crate::shared::walls::WallMap;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -21,8 +21,8 @@ pub(super) struct Iteration<'a> {
     initial_guess: &'a InitialGuess,
     pub(super) parameters: &'a IcpParameters,
     measurements: Vec<Measurement>,
-    /// For each point of b, the wall of a that was nearest when it was last paired.
-    partners: Vec<u32>,
+    /// For each point of b, the lookup of its nearest wall of a.
+    lookups: Vec<MovingLookup>,
     state: IterationState,
 }
 
@@ -61,8 +61,8 @@ impl<'a> Iteration<'a> {
             inliers: 0,
             mean_square_error: 0.0,
         };
-        let partners = vec![u32::MAX; b.walls.points().len()];
-        Self { a, b, initial_guess, parameters, measurements: Vec::new(), partners, state }
+        let lookups = vec![MovingLookup::default(); b.walls.points().len()];
+        Self { a, b, initial_guess, parameters, measurements: Vec::new(), lookups, state }
     }
 
     /// Estimate of the last iteration.
@@ -139,11 +139,10 @@ impl<'a> Iteration<'a> {
         let (mut sum, mut squares) = (Vector2::zeros(), 0.0);
         let origin = transform_a_b.translation.vector;
         let usual = distance / 3.0;
-        let points_b = b.walls.points().iter().zip(&b.normals).zip(&mut self.partners);
-        for ((point_b, normal_b), last_partner) in points_b.step_by(stride) {
+        let points_b = b.walls.points().iter().zip(&b.normals).zip(&mut self.lookups);
+        for ((point_b, normal_b), lookup) in points_b.step_by(stride) {
             let point = transform_a_b * point_b;
-            let Some(partner) = a.walls.nearest_from(&point, distance, *last_partner as usize) else { continue };
-            *last_partner = partner.index as u32;
+            let Some(partner) = lookup.nearest(&a.walls, &point, distance) else { continue };
             let offset = point - a.walls.points()[partner.index];
             let normal = a.normals[partner.index];
             let arm = point.coords - origin;

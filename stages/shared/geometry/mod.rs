@@ -4,6 +4,7 @@
 
 mod cell_box;
 mod grid;
+mod moving_lookup;
 mod point_index;
 mod pose;
 pub mod relative_pose;
@@ -12,6 +13,7 @@ mod rigid_fit;
 pub use cell_box::CellBox;
 pub use grid::{Cell, Grid, GridGeometry, most_cells_over};
 pub use gridweave_runtime::ros::cell::{UNKNOWN, is_free, is_known, is_occupied};
+pub use moving_lookup::MovingLookup;
 pub use point_index::{Buckets, Neighbour, PointIndex};
 pub use pose::{Point2, Pose2, pose, quarter_turn, row_by_row, turn_difference, wrap_angle};
 pub use rigid_fit::{PointPair, RigidFit, covariance_about, fit_rigid, point_jacobian};

@@ -135,21 +135,27 @@ impl PointIndex {
     /// The same, given the index of a point that may be near: the nearer it is, the fewer others are looked at. An
     /// index of no point is ignored.
     pub fn nearest_from(&self, point: &Point2, radius: f64, near: usize) -> Option<Neighbour> {
+        self.two_nearest(point, radius, near, 0.0).nearest()
+    }
+
+    /// Looks for the nearest point within `radius`, and for the next that is at most `beyond` farther away.
+    pub(super) fn two_nearest(&self, point: &Point2, radius: f64, near: usize, beyond: f64) -> TwoNearest {
         let Buckets { corner, side, columns, rows } = self.buckets;
         let local = (point - corner) / side;
-        let mut best = Best { index: usize::MAX, limit: radius * radius };
+        let mut found = TwoNearest::within(radius);
         if let Some(known) = self.points.get(near) {
-            best.offer(near, (known - point).norm_squared());
+            found.offer(near, (known - point).norm_squared());
         }
         // A little more, so that of points at equal distance the first is found.
-        let mut reach = (1.0 + 1e-12) * best.limit.sqrt() / side;
+        let reach_of = |found: &TwoNearest| ((1.0 + 1e-12) * found.limit.sqrt() + beyond) / side;
+        let mut reach = reach_of(&found);
         // Written so that a value that is not a number fails it.
         let inside = local.x + reach >= 0.0
             && local.y + reach >= 0.0
             && local.x - reach < columns as f64
             && local.y - reach < rows as f64;
         if self.points.is_empty() || !inside {
-            return best.found();
+            return found;
         }
         // There are fewer than 2^32 columns or rows, and a cast to 32 bits takes a fraction of the time.
         let clamp = |value: f64, count: usize| (value.max(0.0) as u32 as usize).min(count - 1);
@@ -163,36 +169,44 @@ impl PointIndex {
                 if row < first_row || row > last_row || gap > reach {
                     continue;
                 }
-                let limit = best.limit;
+                let limit = found.limit;
                 let run = self.run(row, clamp(local.x - reach, columns), clamp(local.x + reach, columns));
                 for (index, candidate) in run.clone().zip(&self.points[run]) {
-                    best.offer(index, (candidate - point).norm_squared());
+                    found.offer(index, (candidate - point).norm_squared());
                 }
-                if best.limit < limit {
-                    reach = (1.0 + 1e-12) * best.limit.sqrt() / side;
+                if found.limit < limit {
+                    reach = reach_of(&found);
                 }
             }
         }
-        best.found()
+        found
     }
 }
 
-/// The nearest of the points so far.
-struct Best {
-    /// Its index; beyond all if there is none.
+/// The nearest of the points so far, and how near another may be.
+pub(super) struct TwoNearest {
+    /// Index of the nearest; beyond all if there is none.
     index: usize,
     /// Square of the distance to it, or of the largest one.
     limit: f64,
+    /// Square of the distance to the nearest of the others that were looked at, or of the largest one.
+    pub(super) second: f64,
 }
 
-impl Best {
+impl TwoNearest {
+    fn within(radius: f64) -> Self {
+        Self { index: usize::MAX, limit: radius * radius, second: radius * radius }
+    }
+
     fn offer(&mut self, index: usize, squared_distance: f64) {
         if squared_distance < self.limit || (squared_distance == self.limit && index < self.index) {
-            *self = Self { index, limit: squared_distance };
+            *self = Self { index, limit: squared_distance, second: self.limit };
+        } else if squared_distance < self.second && index != self.index {
+            self.second = squared_distance;
         }
     }
 
-    fn found(self) -> Option<Neighbour> {
+    pub(super) fn nearest(&self) -> Option<Neighbour> {
         (self.index < usize::MAX).then_some(Neighbour { index: self.index, squared_distance: self.limit })
     }
 }
