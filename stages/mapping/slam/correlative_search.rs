@@ -1,8 +1,11 @@
 //! Search of the pose of a scan within a window, by its correlation with a likelihood field.
 
-use super::likelihood_field::{CELL, LEVELS, LikelihoodField};
+use super::likelihood_field::{CELL, LikelihoodField};
 use crate::shared::geometry::{Point2, Pose2, pose, wrap_angle};
 use nalgebra::{Matrix3, Vector2, Vector3};
+
+/// Margin of the likelihood field around the points, metres: the reach of a wall in it.
+const MARGIN: f64 = 0.3;
 
 /// What is known of a pose before the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -150,12 +153,6 @@ impl Window {
         Self { mean, half, rotations: (-turns..=turns).map(rotation).collect() }
     }
 
-    /// The least level at which a square is wider than half the window, of those that the field has.
-    fn top_level(&self) -> usize {
-        let widest = self.half.into_iter().max().unwrap_or(0).max(1);
-        (0..LEVELS).find(|level| 1 << level > widest).unwrap_or(LEVELS - 1)
-    }
-
     /// Whether a square with this least translation reaches into the window.
     fn contains(&self, offset: [i32; 2]) -> bool {
         offset[0] <= self.half[0] && offset[1] <= self.half[1]
@@ -194,7 +191,7 @@ impl Scorer<'_> {
 
     /// The nodes that cover the window, the best last; equals in the order of the window.
     fn roots(&self) -> Vec<Node> {
-        let (level, [half_x, half_y]) = (self.window.top_level(), self.window.half);
+        let (level, [half_x, half_y]) = (self.field.top_level(), self.window.half);
         let mut roots = Vec::new();
         for rotation in 0..self.window.rotations.len() {
             for x in (-half_x..=half_x).step_by(1 << level) {
@@ -223,6 +220,19 @@ impl Scorer<'_> {
 }
 
 impl PosePrior {
+    /// Lower and upper corner of a rectangle that holds the points at all poses of the window.
+    pub(super) fn reach(&self, points: &[Point2]) -> [Point2; 2] {
+        let Self { mean, window, .. } = self;
+        let mut corners = [mean.translation.vector; 2];
+        for point in points {
+            let place = (mean * point).coords;
+            let sweep = Vector2::repeat(point.coords.norm() * window[2].min(2.0));
+            corners = [corners[0].inf(&(place - sweep)), corners[1].sup(&(place + sweep))];
+        }
+        let margin = Vector2::new(window[0], window[1]) + Vector2::repeat(MARGIN);
+        [(corners[0] - margin).into(), (corners[1] + margin).into()]
+    }
+
     /// Information on the yaw alone, whatever the position is: the inverse of its variance.
     fn information_of_turn(&self) -> f64 {
         let of_position = self.information.fixed_view::<2, 2>(0, 0).into_owned();
@@ -251,7 +261,7 @@ mod tests {
     }
 
     fn field() -> LikelihoodField {
-        LikelihoodField::new(room().into_iter(), &Point2::new(-6.0, -6.0), &Point2::new(7.0, 7.0))
+        LikelihoodField::new(room().into_iter(), &[Point2::new(-6.0, -6.0), Point2::new(7.0, 7.0)], 1.0)
     }
 
     #[test]

@@ -1,16 +1,14 @@
 //! The map around a robot, on which its scans are registered.
 
+use super::correlative_search::PosePrior;
 use super::likelihood_field::LikelihoodField;
 use super::scan_points::{SPACING, ScanPoint};
 use crate::shared::geometry::{MovingLookup, Point2, PointIndex, Pose2, quarter_turn};
 use crate::shared::walls::{CORRELATION_LENGTH, DEVIATION, LEAST_NORMAL_AGREEMENT};
 use nalgebra::{Matrix3, Vector2, Vector3};
-use std::f64::consts::TAU;
 
 /// Side of the cells in which points of one direction are averaged, metres.
 const SURFACE_CELL: f64 = 0.1;
-/// Sectors of directions.
-const SECTORS: f64 = 12.0;
 /// Distances within which a point is matched with a surface, metres: from the search's cells down to the noise.
 const RADII: [f64; 7] = [0.3, 0.25, 0.2, LAST_RADIUS, LAST_RADIUS, LAST_RADIUS, LAST_RADIUS];
 const LAST_RADIUS: f64 = 0.15;
@@ -87,9 +85,10 @@ impl LocalMap {
         Self { points, surfaces, index, spots }
     }
 
-    /// The likelihood field of the map within a rectangle.
-    pub(super) fn field(&self, low: &Point2, high: &Point2) -> LikelihoodField {
-        LikelihoodField::new(self.points.iter().copied(), low, high)
+    /// The likelihood field of the map for a search of points in a window about a pose.
+    pub(super) fn field(&self, points: &[Point2], prior: &PosePrior) -> LikelihoodField {
+        let [x, y, _] = prior.window;
+        LikelihoodField::new(self.points.iter().copied(), &prior.reach(points), x.max(y))
     }
 
     /// Registers points on the walls: the distances of the points to the lines of the surfaces are minimised together
@@ -217,9 +216,23 @@ impl<'a> Registration<'a> {
 fn key(place: &Point2, normal: &Vector2<f64>) -> u64 {
     // Within half of what 30 bits hold, which is 50,000 km.
     const MIDDLE: f64 = (1_u64 << 29) as f64;
-    let cell = |coordinate: f64| ((coordinate / SURFACE_CELL).floor() + MIDDLE).clamp(0.0, 2.0 * MIDDLE - 1.0) as u64;
-    let sector = (normal.y.atan2(normal.x) / TAU * SECTORS + SECTORS / 2.0).floor() as u64;
-    (cell(place.x) << 34) | (cell(place.y) << 4) | sector
+    let cell = |coordinate: f64| (coordinate / SURFACE_CELL + MIDDLE).clamp(0.0, 2.0 * MIDDLE - 1.0) as u64;
+    (cell(place.x) << 34) | (cell(place.y) << 4) | sector(normal)
+}
+
+/// The sector of a direction, of twelve, from that of -x on.
+fn sector(direction: &Vector2<f64>) -> u64 {
+    const TAN_30: f64 = 0.577_350_269_189_625_8;
+    const TAN_60: f64 = 1.732_050_807_568_877_2;
+    let (x, y) = (direction.x.abs(), direction.y.abs());
+    // From the x axis on.
+    let of_quadrant = u64::from(y > TAN_30 * x) + u64::from(y > TAN_60 * x);
+    match (direction.x < 0.0, direction.y < 0.0) {
+        (true, true) => of_quadrant,
+        (false, true) => 5 - of_quadrant,
+        (false, false) => 6 + of_quadrant,
+        (true, false) => 11 - of_quadrant,
+    }
 }
 
 #[cfg(test)]
@@ -246,6 +259,15 @@ mod tests {
             .iter()
             .map(|point| ScanPoint { place: into * point.place, normal: point.normal.map(|normal| into * normal) })
             .collect()
+    }
+
+    #[test]
+    fn sectors_follow_each_other_around_the_circle() {
+        for degrees in 0..360 {
+            let angle = f64::from(degrees) + 0.5;
+            let direction = nalgebra::Rotation2::new(angle.to_radians()) * -Vector2::x();
+            assert_eq!(sector(&direction), (angle / 30.0) as u64, "{angle}");
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::correlative_search::{Excluded, PosePrior, search};
 use super::local_map::LocalMap;
 use super::pose_graph::{Constraint, PoseGraph, turned_information};
 use super::scan_points::ScanPoint;
-use super::scan_registration::{GAIN, reach, thinned};
+use super::scan_registration::{GAIN, thinned};
 use nalgebra::Matrix3;
 use std::cell::LazyCell;
 use std::ops::Range;
@@ -158,8 +158,7 @@ impl Revisit<'_> {
         let information = turned_information(&covariance.try_inverse()?, &mean.rotation);
         let prior = PosePrior { mean, information, window };
         let searched = thinned(points, SEARCHED_POINTS);
-        let [low, high] = reach(&searched, &mean, &window);
-        let field = map.field(&low, &high);
+        let field = map.field(&searched, &prior);
         let found = search(&field, &searched, &prior, GAIN, LEAST_RESPONSE, None)?;
         let fit = map.find(points, &found.pose)?;
         let excluded = Excluded { pose: found.pose, distance: OTHER_PLACE[0], turn: OTHER_PLACE[1] };

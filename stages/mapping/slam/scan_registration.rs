@@ -4,7 +4,7 @@ use super::correlative_search::{PosePrior, search};
 use super::local_map::LocalMap;
 use super::scan_points::ScanPoint;
 use crate::shared::geometry::{Point2, Pose2};
-use nalgebra::{Matrix3, Vector2};
+use nalgebra::Matrix3;
 
 /// Evidence of a point on a wall in the search: the logarithm of how much likelier it is there than elsewhere. Less
 /// than that of one beam, as neighbouring beams hit the same wall.
@@ -22,9 +22,6 @@ pub(super) const WELL_MATCHED: f64 = 0.6;
 const SLIP_WINDOW: [f64; 2] = [0.5, 0.7];
 /// How much more of the points must match for a pose in the wider window.
 const SLIP_GAIN: f64 = 0.2;
-/// Margin of the likelihood field, metres: the reach of a wall in it.
-const MARGIN: f64 = 0.3;
-
 /// A scan on a map.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RegisteredScan {
@@ -66,9 +63,8 @@ fn register_within(
     window: [f64; 3],
 ) -> RegisteredScan {
     let searched = thinned(points, SEARCHED_POINTS);
-    let [low, high] = reach(&searched, guess, &window);
     let prior = PosePrior { mean: *guess, information: *information, window };
-    let found = search(&map.field(&low, &high), &searched, &prior, GAIN, 0.0, None);
+    let found = search(&map.field(&searched, &prior), &searched, &prior, GAIN, 0.0, None);
     let start = found.map_or(*guess, |found| found.pose);
     let fit = map.register(points, &start, (guess, information));
     RegisteredScan { pose: fit.pose, information: fit.information, matched: fit.matched }
@@ -77,16 +73,4 @@ fn register_within(
 /// Points spread evenly over the scan, at most `most`.
 pub(super) fn thinned(points: &[ScanPoint], most: usize) -> Vec<Point2> {
     points.iter().step_by(points.len().div_ceil(most).max(1)).map(|point| point.place).collect()
-}
-
-/// Lower and upper corner of a rectangle that holds the points at all poses of a window about a pose.
-pub(super) fn reach(points: &[Point2], pose: &Pose2, window: &[f64; 3]) -> [Point2; 2] {
-    let mut corners = [pose.translation.vector; 2];
-    for point in points {
-        let place = (pose * point).coords;
-        let sweep = Vector2::repeat(point.coords.norm() * window[2].min(2.0));
-        corners = [corners[0].inf(&(place - sweep)), corners[1].sup(&(place + sweep))];
-    }
-    let margin = Vector2::new(window[0], window[1]) + Vector2::repeat(MARGIN);
-    [(corners[0] - margin).into(), (corners[1] + margin).into()]
 }
