@@ -14,6 +14,9 @@ const RADII: [f64; 7] = [0.3, 0.25, 0.2, LAST_RADIUS, LAST_RADIUS, LAST_RADIUS, 
 const LAST_RADIUS: f64 = 0.15;
 /// Least share of the points of a scan, or of a submap, that lie on a map of which it has seen enough to be registered.
 const LEAST_MATCHED: f64 = 0.5;
+/// Every which point is looked up before all are; and the least share of these, which differs by less from that of all.
+const SAMPLE: usize = 4;
+const LEAST_MATCHED_OF_SAMPLE: f64 = 0.4;
 /// Steps at the last radius that are shorter end the iteration, metres and radians.
 const LEAST_STEP: f64 = 1e-4;
 /// Standard deviation in the weight of a match, as a share of the radius (Welsch).
@@ -101,8 +104,14 @@ impl LocalMap {
     }
 
     /// Registers points by the walls alone. `None` if fewer than [`LEAST_MATCHED`] of them lie on the map, at the end
-    /// or within the first radius of the guess: most scans that share little with the map are found out by that.
+    /// or within the first radius of the guess: most scans share little with the map, and a part of their points shows
+    /// it.
     pub(super) fn find(&self, scan: &[ScanPoint], guess: &Pose2) -> Option<Match> {
+        let sample: Vec<ScanPoint> = scan.iter().step_by(SAMPLE).copied().collect();
+        let of_sample = Registration::new(self, &sample, guess, None).equations(RADII[0]);
+        if of_sample.matched < LEAST_MATCHED_OF_SAMPLE {
+            return None;
+        }
         let mut registration = Registration::new(self, scan, guess, None);
         let equations = registration.equations(RADII[0]);
         if equations.matched < LEAST_MATCHED {
@@ -180,11 +189,13 @@ impl<'a> Registration<'a> {
         // Neighbouring points of a wall are one measurement.
         let information = SPACING / CORRELATION_LENGTH / (DEVIATION * DEVIATION);
         let width = WEIGHT_WIDTH * radius;
+        let mut before = usize::MAX;
         for (point, lookup) in self.scan.iter().zip(&mut self.lookups) {
             let arm = pose.rotation * point.place.coords;
             let place = pose.translation.vector + arm;
             let index = if point.normal.is_some() { &map.index } else { &map.spots };
-            let Some(found) = lookup.nearest(index, &place.into(), radius) else { continue };
+            let Some(found) = lookup.nearest(index, &place.into(), radius, before) else { continue };
+            before = found.index;
             let Some(normal) = point.normal else {
                 let off = map.spots.points()[found.index].coords - place;
                 let weight = information * (-0.5 * off.norm_squared() / (width * width)).exp();

@@ -140,9 +140,11 @@ impl<'a> Iteration<'a> {
         let origin = transform_a_b.translation.vector;
         let usual = distance / 3.0;
         let points_b = b.walls.points().iter().zip(&b.normals).zip(&mut self.lookups);
+        let mut before = usize::MAX;
         for ((point_b, normal_b), lookup) in points_b.step_by(stride) {
             let point = transform_a_b * point_b;
-            let Some(partner) = lookup.nearest(&a.walls, &point, distance) else { continue };
+            let Some(partner) = lookup.nearest(&a.walls, &point, distance, before) else { continue };
+            before = partner.index;
             let offset = point - a.walls.points()[partner.index];
             let normal = a.normals[partner.index];
             let arm = point.coords - origin;
