@@ -2,7 +2,7 @@
 
 use crate::shared::geometry::relative_pose::{self, rotation_of_pose};
 use crate::shared::geometry::{Point2, Pose2, quarter_turn};
-use crate::shared::sparse::{Columns, factor, nested_dissection};
+use crate::shared::sparse::{Columns, SimilarSystems, nested_dissection};
 use nalgebra::{Matrix3, UnitComplex, Vector3};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -101,15 +101,20 @@ impl PoseGraph {
     /// are wide at first, so that those of a long drive are not taken for wrong ones, and narrow with the steps
     /// (graduated non-convexity, Yang et al. 2020).
     pub fn optimize(&mut self) {
-        self.iterate(true);
+        self.optimize_with(&mut Solver::default());
+    }
+
+    /// The same with a solver that is used again where the measurements are nearly the same.
+    pub fn optimize_with(&mut self, solver: &mut Solver) {
+        self.iterate(true, solver);
     }
 
     /// The same for poses that are near the minimum, to a millimetre: the weights are narrow from the first step on.
-    pub fn settle(&mut self) {
-        self.iterate(false);
+    pub fn settle(&mut self, solver: &mut Solver) {
+        self.iterate(false, solver);
     }
 
-    fn iterate(&mut self, is_graduated: bool) {
+    fn iterate(&mut self, is_graduated: bool, solver: &mut Solver) {
         let count = self.poses.len();
         let mut nodes = self.poses.clone();
         let landmarks = self.sightings.iter().map(|sighting| sighting.landmark + 1).max().unwrap_or(0);
@@ -127,7 +132,7 @@ impl PoseGraph {
             false => (1.0, LEAST_SETTLING_STEP),
         };
         for _ in 0..MAX_STEPS {
-            let Some(moves) = step(&nodes, &constraints, width) else { break };
+            let Some(moves) = solver.step(&nodes, &constraints, width) else { break };
             let mut longest = 0.0f64;
             for (pose, step) in nodes.iter_mut().zip(&moves).skip(1) {
                 pose.translation.vector += step.xy();
@@ -182,10 +187,58 @@ impl PoseGraph {
     }
 }
 
-/// A step of all nodes by their measurements. `None` if the equations have no solution.
-fn step(nodes: &[Pose2], constraints: &[Constraint], width: f64) -> Option<Vec<Vector3<f64>>> {
-    let count = nodes.len();
-    let mut neighbours = vec![Vec::new(); count];
+/// Solves the equations of one step after the other.
+#[derive(Debug, Default)]
+pub struct Solver {
+    /// Places of the nodes in the order of elimination.
+    order: Vec<usize>,
+    systems: SimilarSystems,
+}
+
+impl Solver {
+    /// A step of all nodes by their measurements. `None` if the equations have no solution.
+    fn step(&mut self, nodes: &[Pose2], constraints: &[Constraint], width: f64) -> Option<Vec<Vector3<f64>>> {
+        let count = nodes.len();
+        if self.order.len() != count {
+            self.order = elimination_order(nodes, constraints);
+        }
+        let order = &self.order;
+        let mut columns: Columns = vec![Vec::new(); count];
+        let mut vector = vec![Vector3::zeros(); count];
+        let mut add = |row: usize, column: usize, block: Matrix3<f64>| {
+            let (row, column) = (order[row], order[column]);
+            if row >= column {
+                columns[column].push((row, block));
+            }
+        };
+        for node in 0..count {
+            let fixed = if node == 0 { FIXED } else { DAMPING };
+            add(node, node, Matrix3::identity() * fixed);
+        }
+        for constraint in constraints {
+            let (from, to) = (&nodes[constraint.from], &nodes[constraint.to]);
+            let residual = relative_pose::residual(from, to, &constraint.transform);
+            let squared = residual.dot(&(constraint.information * residual));
+            let information = constraint.information * constraint.weight(squared, width);
+            let [by_from, by_to] = relative_pose::derivatives(from, to);
+            let sides = [(constraint.from, by_from), (constraint.to, by_to)];
+            for (row, by_row) in &sides {
+                let weighted = by_row.transpose() * information;
+                vector[order[*row]] -= weighted * residual;
+                for (column, by_column) in &sides {
+                    add(*row, *column, weighted * by_column);
+                }
+            }
+        }
+        let solved = self.systems.solve(&columns, &vector)?;
+        let moves: Vec<Vector3<f64>> = order.iter().map(|&place| solved[place]).collect();
+        moves.iter().all(|step| step.iter().all(|value| value.is_finite())).then_some(moves)
+    }
+}
+
+/// Places of the nodes in an order of elimination that leaves the factor sparse.
+fn elimination_order(nodes: &[Pose2], constraints: &[Constraint]) -> Vec<usize> {
+    let mut neighbours = vec![Vec::new(); nodes.len()];
     for Constraint { from, to, .. } in constraints {
         neighbours[*from].push(*to);
         neighbours[*to].push(*from);
@@ -195,37 +248,7 @@ fn step(nodes: &[Pose2], constraints: &[Constraint], width: f64) -> Option<Vec<V
         of_node.dedup();
     }
     let places: Vec<Point2> = nodes.iter().map(|pose| pose.translation.vector.into()).collect();
-    let order = nested_dissection(&places, &neighbours);
-    let mut columns: Columns = vec![Vec::new(); count];
-    let mut vector = vec![Vector3::zeros(); count];
-    let mut add = |row: usize, column: usize, block: Matrix3<f64>| {
-        let (row, column) = (order[row], order[column]);
-        if row >= column {
-            columns[column].push((row, block));
-        }
-    };
-    for node in 0..count {
-        let fixed = if node == 0 { FIXED } else { DAMPING };
-        add(node, node, Matrix3::identity() * fixed);
-    }
-    for constraint in constraints {
-        let (from, to) = (&nodes[constraint.from], &nodes[constraint.to]);
-        let residual = relative_pose::residual(from, to, &constraint.transform);
-        let squared = residual.dot(&(constraint.information * residual));
-        let information = constraint.information * constraint.weight(squared, width);
-        let [by_from, by_to] = relative_pose::derivatives(from, to);
-        let sides = [(constraint.from, by_from), (constraint.to, by_to)];
-        for (row, by_row) in &sides {
-            let weighted = by_row.transpose() * information;
-            vector[order[*row]] -= weighted * residual;
-            for (column, by_column) in &sides {
-                add(*row, *column, weighted * by_column);
-            }
-        }
-    }
-    let solved = factor(&columns)?.solve(&vector);
-    let moves: Vec<Vector3<f64>> = order.iter().map(|&place| solved[place]).collect();
-    moves.iter().all(|step| step.iter().all(|value| value.is_finite())).then_some(moves)
+    nested_dissection(&places, &neighbours)
 }
 
 /// A node that the search of the most certain paths has reached.

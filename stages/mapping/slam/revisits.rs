@@ -6,7 +6,7 @@
 
 use super::local_map::LocalMap;
 use super::loop_closure::{Drive, Revisit, middle};
-use super::pose_graph::{Constraint, PoseGraph};
+use super::pose_graph::{Constraint, PoseGraph, Solver};
 use super::scan_points::ScanPoint;
 use crate::shared::geometry::Pose2;
 use rayon::prelude::*;
@@ -53,6 +53,7 @@ pub(super) fn refine(
     let known = graph.constraints.len();
     let mut matches = vec![SubmapMatches::default(); submaps.len()];
     let mut has_moved = false;
+    let mut solver = Solver::default();
     for _ in 0..ROUNDS {
         let revisit = Revisit { graph, scans, submaps, drives, recent: scans.len() };
         let found = register_on_revisited(&revisit, apart, &mut matches);
@@ -63,9 +64,9 @@ pub(super) fn refine(
         let before = graph.poses.clone();
         // The first round has moved all near to where they belong.
         if has_moved {
-            graph.settle();
+            graph.settle(&mut solver);
         } else {
-            graph.optimize();
+            graph.optimize_with(&mut solver);
         }
         // The next round measures them anew, where scans have moved.
         graph.constraints.truncate(known);

@@ -1,6 +1,6 @@
 //! A dense column of blocks of 3 x 3, on which all arithmetic of the factorization is done.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Three columns of a dense matrix, one after the other in memory: the processor works on several rows at once.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,6 +76,24 @@ impl BlockColumn {
         }
     }
 
+    /// Subtracts the product of the blocks below the first and a vector from the rows of these blocks.
+    pub(super) fn subtract_below(&self, by: &Vector3<f64>, rows: &mut [f64]) {
+        let [xs, ys, zs] = self.below();
+        for (((row, x), y), z) in rows.iter_mut().zip(xs).zip(ys).zip(zs) {
+            *row -= x * by.x + y * by.y + z * by.z;
+        }
+    }
+
+    /// Product of the transposed blocks below the first and the rows of these blocks.
+    pub(super) fn product_below(&self, rows: &[f64]) -> Vector3<f64> {
+        self.below().map(|column| dot(column, &rows[..column.len()])).into()
+    }
+
+    /// The three columns below the first block.
+    fn below(&self) -> [&[f64]; 3] {
+        std::array::from_fn(|column| &self.values[column * self.height + 3..(column + 1) * self.height])
+    }
+
     /// Multiplies the blocks from `first` on by a matrix from the right.
     pub(super) fn multiply(&mut self, first: usize, by: &Matrix3<f64>) {
         let (xs, rest) = self.values.split_at_mut(self.height);
@@ -88,4 +106,16 @@ impl BlockColumn {
             *to_z = x * by.m13 + y * by.m23 + z * by.m33;
         }
     }
+}
+
+/// Scalar product, in sums of their own for the places that the processor multiplies together.
+fn dot(one: &[f64], other: &[f64]) -> f64 {
+    const TOGETHER: usize = 4;
+    let mut sums = [0.0; TOGETHER];
+    let ((ones, last_one), (others, last_other)) = (one.as_chunks::<TOGETHER>(), other.as_chunks::<TOGETHER>());
+    for (one, other) in ones.iter().zip(others) {
+        sums.iter_mut().zip(one.iter().zip(other)).for_each(|(sum, (one, other))| *sum += one * other);
+    }
+    let rest: f64 = last_one.iter().zip(last_other).map(|(one, other)| one * other).sum();
+    sums.iter().sum::<f64>() + rest
 }

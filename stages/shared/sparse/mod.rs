@@ -1,7 +1,8 @@
 //! Direct solution of sparse symmetric systems of blocks of 3 x 3: those of poses and of nodes of a deformation.
 //!
 //! [`nested_dissection`] or [`minimum_degree`] orders the unknowns, [`factor`] computes the Cholesky factor in that order, and
-//! [`BlockCholesky`] solves with it and computes the parts of the inverse that are needed. Arithmetic is done on dense
+//! [`BlockCholesky`] solves with it and computes the parts of the inverse that are needed; with [`SimilarSystems`] it solves
+//! others, too. Arithmetic is done on dense
 //! parts, the fronts of an assembly tree.
 
 mod assembly_tree;
@@ -11,6 +12,7 @@ mod dissection;
 mod factoring;
 mod minimum_degree;
 mod selected_inverse;
+mod similar_systems;
 #[cfg(test)]
 mod tests;
 
@@ -19,6 +21,7 @@ pub(crate) use dissection::nested_dissection;
 pub(crate) use factoring::factor;
 pub(crate) use minimum_degree::minimum_degree;
 pub(crate) use selected_inverse::SelectedInverse;
+pub(crate) use similar_systems::SimilarSystems;
 
 use nalgebra::Matrix3;
 

@@ -50,6 +50,49 @@ proptest! {
     }
 }
 
+proptest! {
+    #[test]
+    fn systems_that_follow_each_other_are_solved_as_each_by_itself(
+        seed in prop::collection::vec(-1.0..1.0f64, 9 * BLOCKS * BLOCKS),
+        changes in prop::collection::vec(prop::collection::vec(0.0..3.0f64, BLOCKS), 1..5),
+        holes in 0..100_usize,
+    ) {
+        let (mut columns, _) = matrix(&seed, holes);
+        let right: Vec<Vector3<f64>> = (0..BLOCKS).map(|row| Vector3::from_column_slice(&seed[3 * row..][..3])).collect();
+        let mut systems = SimilarSystems::default();
+        for change in changes {
+            for (place, by) in change.into_iter().enumerate() {
+                columns[place].push((place, Matrix3::identity() * by * by * by));
+            }
+            let expected = factor(&columns).unwrap().solve(&right);
+            let largest = expected.iter().map(Vector3::norm).fold(0.0, f64::max);
+            for (found, expected) in systems.solve(&columns, &right).unwrap().iter().zip(&expected) {
+                prop_assert!((found - expected).norm() <= 1e-5 * largest);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_factor_of_other_size_or_of_another_matrix_is_not_taken() {
+    let mut systems = SimilarSystems::default();
+    let diagonal = |count: usize| -> Columns {
+        (0..count).map(|place| vec![(place, Matrix3::identity() * 10f64.powi(place as i32 % 9))]).collect()
+    };
+    for count in [3, 100] {
+        let solution = systems.solve(&diagonal(count), &vec![Vector3::x(); count]).unwrap();
+        assert!((solution[2].x - 0.01).abs() < 1e-12);
+    }
+    // As many different quotients as there are unknowns take more steps than there may be.
+    let others: Columns = (0..100).map(|place| vec![(place, Matrix3::identity() * (1.0 + place as f64))]).collect();
+    let solution = systems.solve(&others, &vec![Vector3::x(); 100]).unwrap();
+    for (place, found) in solution.iter().enumerate() {
+        assert!((found.x * (1.0 + place as f64) - 1.0).abs() < 1e-6, "{place}");
+    }
+    let not_definite: Columns = vec![vec![(0, -Matrix3::identity())]];
+    assert!(systems.solve(&not_definite, &[Vector3::x()]).is_none());
+}
+
 /// A lattice of `width` times `height` nodes, each connected with those around it, in an elimination order.
 fn lattice(width: usize, height: usize) -> Columns {
     let at: Vec<Point2> =
