@@ -1,9 +1,8 @@
 //! Direct solution of sparse symmetric systems of blocks of 3 x 3: those of poses and of nodes of a deformation.
 //!
 //! [`nested_dissection`] or [`minimum_degree`] orders the unknowns, [`factor`] computes the Cholesky factor in that order, and
-//! [`BlockCholesky`] solves with it and computes the parts of the inverse that are needed; with [`SimilarSystems`] it solves
-//! others, too. Arithmetic is done on dense
-//! parts, the fronts of an assembly tree.
+//! [`BlockCholesky`] solves with it and computes the parts of the inverse that are needed. [`SimilarSystems`] solves further
+//! systems with the factor of one. Arithmetic is done on dense parts, the fronts of an assembly tree.
 
 mod assembly_tree;
 mod block_cholesky;

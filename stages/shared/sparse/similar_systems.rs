@@ -29,7 +29,8 @@ impl SimilarSystems {
     }
 }
 
-/// Solves a system by the method of conjugate gradients. `None` if it has not converged in time.
+/// Solves a system by the method of conjugate gradients. `None` if it has not converged in time, as where a value is not
+/// a number.
 fn conjugate_gradients(
     matrix: &Columns,
     right: &[Vector3<f64>],
@@ -41,16 +42,15 @@ fn conjugate_gradients(
     let mut error = dot(&residual, &along);
     let wanted = LEAST_ERROR * LEAST_ERROR * error;
     for _ in 0..MAX_STEPS {
+        if error <= wanted {
+            return Some(solution);
+        }
         let product = product(matrix, &along);
         let step = error / dot(&along, &product);
         add(&mut solution, step, &along);
         add(&mut residual, -step, &product);
         let preconditioned = preconditioner.solve(&residual);
         let before = std::mem::replace(&mut error, dot(&residual, &preconditioned));
-        // Not a number is neither.
-        if error <= wanted {
-            return Some(solution);
-        }
         let share = error / before;
         along.iter_mut().zip(&preconditioned).for_each(|(along, by)| *along = by + share * *along);
     }

@@ -82,6 +82,7 @@ fn a_factor_of_other_size_or_of_another_matrix_is_not_taken() {
     for count in [3, 100] {
         let solution = systems.solve(&diagonal(count), &vec![Vector3::x(); count]).unwrap();
         assert!((solution[2].x - 0.01).abs() < 1e-12);
+        assert_eq!(systems.solve(&diagonal(count), &vec![Vector3::zeros(); count]).unwrap()[0], Vector3::zeros());
     }
     // As many different quotients as there are unknowns take more steps than there may be.
     let others: Columns = (0..100).map(|place| vec![(place, Matrix3::identity() * (1.0 + place as f64))]).collect();
