@@ -71,10 +71,14 @@ impl Scale {
         let mut best =
             order.iter().take(LOOKED_AT).filter_map(|number| at(factors[*number])).reduce(Self::more_probable)?;
         let mut step = 0.5 * rasters.step();
+        // Where it was sharper on one side, the other is the factor that it comes from.
+        let mut is_known = [false; 2];
         while step > FINEST_STEP {
-            let (smaller, larger) = rayon::join(|| at(best.factor * (-step).exp()), || at(best.factor * step.exp()));
+            let beside = |side: usize, step: f64| (!is_known[side]).then(|| at(best.factor * step.exp()))?;
+            let (smaller, larger) = rayon::join(|| beside(0, -step), || beside(1, step));
             let last = best.factor;
             best = [smaller, larger].into_iter().flatten().fold(best, sharper);
+            is_known = [best.factor > last, best.factor < last];
             step = if best.factor == last { 0.5 * step } else { step };
         }
         // A deformation makes up for what is left, and shows it.
