@@ -25,7 +25,7 @@ struct Trouble {
     stall: u64,
     /// The message at which it happens; never if 0.
     at: u64,
-    /// fail, panic, hang, abort, eat, print, nothing_passes.
+    /// fail, panic, hang, hold (hang, and make a file `held`), abort, eat, print, nothing_passes.
     what: String,
     /// Wait before these messages, each time for a file `gate_NUMBER` in the folder in which the run was started.
     gates: Vec<u64>,
@@ -61,6 +61,12 @@ impl Trouble {
             "fail" => Err(StageError::new("go on", "as configured")),
             "panic" => panic!("as configured"),
             "abort" => std::process::abort(),
+            "hold" => {
+                let _ = std::fs::write("held", "");
+                loop {
+                    std::thread::sleep(Duration::from_secs(1));
+                }
+            }
             "hang" => loop {
                 std::thread::sleep(Duration::from_secs(1));
             },

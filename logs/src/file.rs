@@ -14,6 +14,7 @@ pub(crate) use same_file::folder_of;
 pub use same_file::{is_same_file, is_same_name, resolve};
 
 use crate::os_error;
+use gridweave_runtime::left_behind::{self, Registration};
 use rustix::fs::{Access, OFlags, access};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, ErrorKind};
@@ -83,6 +84,8 @@ pub struct OutputFile {
     file: File,
     /// Whether the part is kept on drop.
     is_kept: bool,
+    /// The removal of a part that this process has made, should it end at once.
+    _registration: Option<Registration>,
 }
 
 impl OutputFile {
@@ -106,7 +109,10 @@ impl OutputFile {
             match is_at(&file, &part) {
                 // Another writer has renamed or removed it before it was locked here.
                 false => {}
-                true if is_made => return Ok(Self { path: path.to_owned(), place, part, file, is_kept: false }),
+                true if is_made => {
+                    let _registration = removal_of(&file, &part);
+                    return Ok(Self { path: path.to_owned(), place, part, file, is_kept: false, _registration });
+                }
                 true => {
                     warn_of_removal(&file, &part);
                     fs::remove_file(&part).map_err(of_path)?;
@@ -124,7 +130,7 @@ impl OutputFile {
         };
         lock(&file, path, &part, false)?;
         let path = path.to_owned();
-        Ok(is_at(&file, &part).then_some(Self { path, place, part, file, is_kept: true }))
+        Ok(is_at(&file, &part).then_some(Self { path, place, part, file, is_kept: true, _registration: None }))
     }
 
     /// The open part.
@@ -196,6 +202,17 @@ impl Drop for OutputFile {
             let _ = fs::remove_file(&self.part);
         }
     }
+}
+
+/// Registers that a part is removed, unless it has another place or is another file by then.
+fn removal_of(file: &File, part: &Path) -> Option<Registration> {
+    let (made, part) = (file.metadata().ok()?, part.to_owned());
+    let made = (made.dev(), made.ino());
+    Some(left_behind::register(move || {
+        if fs::symlink_metadata(&part).is_ok_and(|now| (now.dev(), now.ino()) == made) {
+            let _ = fs::remove_file(&part);
+        }
+    }))
 }
 
 /// Links are not followed, and pipes do not block.

@@ -1,12 +1,17 @@
 //! Handling of signals that end the program, so that outputs are closed and nothing is left behind.
 
 use crate::terminal::eprint_line;
+use gridweave_runtime::engine::wait_for_long_call;
+use gridweave_runtime::left_behind;
 use nix::sys::signal::{SigSet, Signal};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
 /// Whether the user has interrupted the program.
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// Whether the program runs a replay. Its input is still there, so what it has written is worth no wait.
+static IS_REPLAY: AtomicBool = AtomicBool::new(false);
 
 /// Message on the interrupt of a run.
 pub(crate) const OUTPUT_IS_CLOSED: &str = "the output is being closed";
@@ -52,9 +57,30 @@ pub(crate) fn stop_on_interrupt(what_follows: &'static str) -> &'static AtomicBo
     &INTERRUPTED
 }
 
+/// The same for a replay. If a stage goes on working for more than a second after a signal, the program ends without it;
+/// what it has written to the output is removed then, and an earlier output stays.
+pub(crate) fn stop_replay_on_interrupt() -> &'static AtomicBool {
+    IS_REPLAY.store(true, Ordering::Relaxed);
+    stop_on_interrupt(OUTPUT_IS_CLOSED)
+}
+
 fn interrupt(what_follows: &str) {
+    let is_replay = IS_REPLAY.load(Ordering::Relaxed);
     if INTERRUPTED.swap(true, Ordering::Relaxed) {
+        if is_replay {
+            left_behind::end_process(130);
+        }
         std::process::exit(130);
     }
+    if is_replay {
+        // Without the thread, the run ends with the work of its stage.
+        let _ = thread::Builder::new().name("stopping".to_owned()).spawn(end_without_long_call);
+    }
     eprint_line(format_args!("interrupted: {what_follows}; a second signal ends the program at once"));
+}
+
+fn end_without_long_call() {
+    wait_for_long_call();
+    eprint_line("error: the run was interrupted in the work of a stage; what it had begun to write was removed");
+    left_behind::end_process(1);
 }

@@ -10,6 +10,7 @@
 pub mod covariance_ellipse;
 pub mod engine;
 pub mod input_file;
+pub mod left_behind;
 pub mod link;
 pub mod memory;
 pub mod message;

@@ -61,3 +61,41 @@ fn the_output_can_be_read_and_says_that_it_is_not_complete() {
         info.assert(0, &[&format!("{written} messages"), "ended early", "the run was interrupted"]);
     }
 }
+
+/// A stage that works for ever on its first message.
+const LONG_CALL: &str = r#"
+[pipeline]
+name = "long_call"
+
+[stages.source]
+kind = "troubled_source"
+count = 100
+
+[stages.stage]
+kind = "troubled_stage"
+inputs = ["source"]
+at = 1
+what = "hold"
+
+[stages.output]
+kind = "mcap_sink"
+inputs = ["stage"]
+"#;
+
+#[test]
+fn a_run_that_is_interrupted_in_the_long_work_of_a_stage_ends_without_it_and_leaves_only_the_earlier_output() {
+    for engine in ["single", "threads", "threads-ipc", "processes"] {
+        let folder = TempDir::new().unwrap();
+        fs::write(folder.path().join("long_call.toml"), LONG_CALL).unwrap();
+        fs::write(folder.path().join("out.mcap"), "earlier").unwrap();
+        let run = start(folder.path(), &["run", "long_call.toml", "-o", "out.mcap", "--engine", engine], &[]);
+        let id = run.id();
+        let held = folder.path().join("held");
+        wait_until("the work of the stage", || held.exists());
+        signal(id, "TERM");
+        run.wait().assert(1, &["the run was interrupted"]);
+        assert_eq!(left_over(id), Vec::<PathBuf>::new(), "{engine}");
+        assert_eq!(fs::read_to_string(folder.path().join("out.mcap")).unwrap(), "earlier");
+        assert!(!part(&folder.path().join("out.mcap")).exists(), "{engine}");
+    }
+}

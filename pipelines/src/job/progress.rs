@@ -1,6 +1,6 @@
 //! Progress of a run: a bar on a terminal, plain lines elsewhere.
 
-use crate::interrupt::{OUTPUT_IS_CLOSED, stop_on_interrupt};
+use crate::interrupt::{stop_on_interrupt, stop_replay_on_interrupt};
 use crate::terminal::eprint_line;
 use gridweave_runtime::engine::Observer;
 use gridweave_runtime::message::LogTime;
@@ -97,10 +97,10 @@ pub(crate) struct Progress {
 impl Progress {
     /// Starts the display. An interrupt of the user ends the run.
     pub(crate) fn new(mode: Mode) -> Self {
-        let stop = stop_on_interrupt(match mode {
-            Mode::Replay => OUTPUT_IS_CLOSED,
-            Mode::Live => "messages in the queues are handled first",
-        });
+        let stop = match mode {
+            Mode::Replay => stop_replay_on_interrupt(),
+            Mode::Live => stop_on_interrupt("messages in the queues are handled first"),
+        };
         // The end of a live run is not known.
         Self { gauge: Gauge::new(mode == Mode::Replay), start: AtomicU64::new(u64::MAX), mode, stop }
     }

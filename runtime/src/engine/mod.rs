@@ -3,6 +3,7 @@
 //! Every engine delivers the same inputs in the same order to each stage, so every engine produces the same result.
 
 mod address_space;
+mod calls;
 mod error;
 mod external_sender;
 mod links;
@@ -22,6 +23,7 @@ mod user_folder;
 mod watch;
 mod work_timer;
 
+pub use calls::wait_for_long_call;
 pub use error::{Failure, RunError};
 pub use external_sender::{ExternalSender, SenderStopper};
 pub use private_folder::PrivateFolder;

@@ -8,6 +8,7 @@ use super::links::counters_shape;
 use super::run_lock::{LOCK, Removal, lock_for_removal, lock_for_run};
 use super::run_prefix::{counters_path, is_prefix, is_prefix_of, new_prefix, shared_memory};
 use super::user_folder::{self, OWN_FILE, OWN_FOLDER, is_own};
+use crate::left_behind::{self, Registration};
 use crate::link::{RunNames, SharedCounters};
 use crate::pipeline::Pipeline;
 use std::fs::{self, DirBuilder, File, TryLockError};
@@ -29,6 +30,8 @@ pub struct RunFolder {
     prefix: String,
     path: PathBuf,
     _lock: File,
+    /// Only of the process that removes it.
+    _registration: Option<Registration>,
 }
 
 /// An error with the folder of a run.
@@ -68,7 +71,9 @@ impl RunFolder {
             let path = parent.join(&prefix);
             DirBuilder::new().mode(OWN_FOLDER).create(&path).map_err(failed("create the folder", &path))?;
             if let Some(lock) = lock_for_run(&path).map_err(failed("lock a file in the folder", &path))? {
-                return Ok(Self { prefix, path, _lock: lock });
+                let (of_prefix, at) = (prefix.clone(), path.clone());
+                let registration = left_behind::register(move || drop(remove(&at, &of_prefix)));
+                return Ok(Self { prefix, path, _lock: lock, _registration: Some(registration) });
             }
         }
     }
@@ -85,7 +90,7 @@ impl RunFolder {
         });
         locked.map_err(failed("lock a file in the folder", path))?;
         let prefix = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Self { prefix, path: path.to_owned(), _lock: lock })
+        Ok(Self { prefix, path: path.to_owned(), _lock: lock, _registration: None })
     }
 
     /// The path of the folder.

@@ -2,6 +2,7 @@
 //!
 //! It logs through `tracing`: its start and end at the level `info`, and each message as a span at the level `debug`.
 
+use super::calls::Call;
 use super::{Failure, StageReport};
 use crate::link::{InputQueue, next_input};
 use crate::message::{Channel, LogTime, Message, MessageFlags};
@@ -158,6 +159,7 @@ impl Runner {
 
     /// Notifies the stage that the run has failed.
     pub(super) fn abort(&mut self, reason: &str) {
+        let _call = Call::closing();
         // The run has failed already; a second failure during the cleanup would only hide the first.
         let _ = catch_unwind(AssertUnwindSafe(|| self.node.abort(reason)));
     }
@@ -182,6 +184,7 @@ impl Runner {
 
 /// Runs code of a stage, and turns a panic into a failure.
 fn guarded<T>(work: impl FnOnce() -> Result<T, StageError>) -> Result<T, Failure> {
+    let _call = Call::working();
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(result) => result.map_err(Failure::Stage),
         Err(panic) => Err(Failure::Panic(panic_text(&*panic))),

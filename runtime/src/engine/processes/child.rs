@@ -2,6 +2,7 @@
 
 use super::protocol::{ProcessReport, SupervisorCommand, write_line};
 use super::suspend_detector::SuspendDetector;
+use crate::engine::calls::wait_for_long_call;
 use crate::engine::links::Links;
 use crate::engine::run_folder::RunFolder;
 use crate::engine::run_links::watch_links;
@@ -139,6 +140,7 @@ impl Process<'_> {
                 Ok(Event::Stop { reason }) => {
                     stop_reason.get_or_init(|| reason);
                     self.control.stop(self.counters);
+                    end_if_stuck();
                     None
                 }
                 Err(RecvTimeoutError::Timeout) => None,
@@ -170,6 +172,16 @@ impl Process<'_> {
     fn name(&self, stage: usize) -> String {
         self.pipeline.stages[stage].name.clone()
     }
+}
+
+/// Ends this process if a stage goes on working. The supervisor closes what it was writing.
+fn end_if_stuck() {
+    let end = || {
+        wait_for_long_call();
+        std::process::exit(1);
+    };
+    // Without a thread, the supervisor ends this process.
+    let _ = thread::Builder::new().name("stopping".to_owned()).spawn(end);
 }
 
 /// Reads the commands of the supervisor in a separate thread. The end of the supervisor is a reason to stop.
