@@ -81,6 +81,14 @@ pub enum Damage {
         /// The number of the next readable message; `None` if there is none.
         to: Option<i64>,
     },
+    /// Rows of a database take more than its file can hold.
+    #[error(
+        "the messages from number {from} on were not read: with those before them they take more than the file can hold"
+    )]
+    ExcessRows {
+        /// The number of the first.
+        from: i64,
+    },
     /// Single messages of a database or ROS 1 bag cannot be read.
     #[error("{count} messages are unreadable: they are damaged, or do not match their definition")]
     LostMessages {

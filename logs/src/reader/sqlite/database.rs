@@ -47,6 +47,7 @@ impl Database {
         let torn = if cut.is_some() { torn_rows(&connection, &file) } else { Vec::new() };
         layout.damage.extend(cut);
         layout.damage.extend(beside(path));
+        tables::check_schema(&connection)?;
         let channels = tables::read_topics(&connection, &mut layout, file.len())?;
         let messages = tables::table(&connection, "messages").map_err(text_of)?;
         let row_number = messages.and_then(|table| table.row_number());

@@ -13,6 +13,9 @@ const RUN_BYTES: u64 = 1 << 20;
 const RUN_ROWS: u64 = 16 << 10;
 /// The maximum number of unreadable gaps that are skipped.
 const MOST_GAPS: u64 = 1000;
+/// The maximum number of messages that are skipped because they take more than is left of the file: of a damaged
+/// database a few, of one that gives the same bytes again and again all.
+const MOST_EXCESS: u64 = 10;
 
 /// A run of rows.
 #[derive(Clone, Copy, Debug)]
@@ -51,12 +54,12 @@ pub(super) fn survey(
     room: u64,
     layout: &mut Layout,
 ) -> rusqlite::Result<()> {
-    // The length of a message is known without reading it.
+    // The length of a message is known without reading it. An index could claim another one.
     let query = format!(
-        "SELECT {row_number}, timestamp, octet_length(data) FROM messages WHERE {row_number} >= ?1 ORDER BY {row_number}"
+        "SELECT {row_number}, timestamp, octet_length(data) FROM messages NOT INDEXED WHERE {row_number} >= ?1 ORDER BY {row_number}"
     );
     let mut statement = connection.prepare(&query)?;
-    let mut runs = Runs { layout, run: None, torn, room };
+    let mut runs = Runs { layout, run: None, torn, room, excess: 0 };
     let (mut from, mut gaps) = (i64::MIN, 0);
     loop {
         let mut last = None;
@@ -72,6 +75,10 @@ pub(super) fn survey(
             (Ok(false) | Err(_), Some(lost_from)) => {
                 // A run is read without gaps.
                 runs.end();
+                if runs.excess > MOST_EXCESS {
+                    runs.layout.damage.push(Damage::ExcessRows { from: lost_from.max(0) });
+                    break;
+                }
                 gaps += 1;
                 let found = (gaps <= MOST_GAPS).then(|| behind(&mut statement, lost_from.max(0))).flatten();
                 runs.layout.damage.push(Damage::LostRows { from: lost_from.max(0), to: found });
@@ -130,8 +137,9 @@ struct Runs<'a> {
     run: Option<Block>,
     /// The ids of incomplete rows, ascending.
     torn: &'a [i64],
-    /// The number of bytes that further messages may take.
+    /// The number of bytes that further messages may take, and the number of those that take more.
     room: u64,
+    excess: u64,
 }
 
 impl Runs<'_> {
@@ -139,7 +147,10 @@ impl Runs<'_> {
     fn push(&mut self, place: &Place) -> bool {
         let Place { number, time, size } = *place;
         let size = if self.torn.binary_search(&number).is_ok() { 0 } else { size };
-        let Some(room) = self.room.checked_sub(size) else { return false };
+        let Some(room) = self.room.checked_sub(size) else {
+            self.excess += 1;
+            return false;
+        };
         self.room = room;
         let run = self.run.get_or_insert(Block {
             first_time: time,
@@ -176,7 +187,8 @@ impl Rows {
         if self.size > LARGEST {
             return Err(ChunkFault::TooMuch { size: self.size });
         }
-        let mut reading = Reading { row_number, torn, channels, records: Vec::new(), seen: 0, read: 0, last: None };
+        let (records, room) = (Vec::new(), self.size);
+        let mut reading = Reading { row_number, torn, channels, records, room, seen: 0, read: 0, last: None };
         // The size is claimed by the database, so it is not trusted.
         let _ = reading.records.try_reserve(usize::try_from(self.size.min(2 * RUN_BYTES)).unwrap_or(0));
         if reading.all(connection, self).is_err() {
@@ -194,6 +206,8 @@ struct Reading<'a> {
     torn: &'a [i64],
     channels: &'a BTreeMap<i64, u16>,
     records: Vec<u8>,
+    /// The number of bytes that further messages may take: no more than the scan has found.
+    room: u64,
     /// The number of rows seen and of messages read, and the id of the last row.
     seen: u64,
     read: u64,
@@ -205,7 +219,7 @@ impl Reading<'_> {
     fn all(&mut self, connection: &Connection, rows: &Rows) -> rusqlite::Result<()> {
         let number = self.row_number;
         let query = format!(
-            "SELECT {number}, timestamp, topic_id, data FROM messages WHERE {number} BETWEEN ?1 AND ?2 ORDER BY {number}"
+            "SELECT {number}, timestamp, topic_id, data FROM messages NOT INDEXED WHERE {number} BETWEEN ?1 AND ?2 ORDER BY {number}"
         );
         let mut statement = connection.prepare(&query)?;
         let mut found = statement.query([rows.first, rows.last])?;
@@ -223,10 +237,11 @@ impl Reading<'_> {
     fn one_by_one(&mut self, connection: &Connection, rows: &Rows) -> rusqlite::Result<()> {
         let number = self.row_number;
         let mut next = connection.prepare(&format!(
-            "SELECT {number} FROM messages WHERE {number} BETWEEN ?1 AND ?2 ORDER BY {number} LIMIT 1"
+            "SELECT {number} FROM messages NOT INDEXED WHERE {number} BETWEEN ?1 AND ?2 ORDER BY {number} LIMIT 1"
         ))?;
-        let mut one = connection
-            .prepare(&format!("SELECT {number}, timestamp, topic_id, data FROM messages WHERE {number} = ?1"))?;
+        let mut one = connection.prepare(&format!(
+            "SELECT {number}, timestamp, topic_id, data FROM messages NOT INDEXED WHERE {number} = ?1"
+        ))?;
         let mut from = self.last.map_or(Some(rows.first), |last| last.checked_add(1));
         while let Some(start) = from.filter(|from| *from <= rows.last) {
             let Ok(number) = next.query_row([start, rows.last], |row| row.get::<_, i64>(0)) else { break };
@@ -252,6 +267,8 @@ impl Reading<'_> {
             _ => return Ok(()),
         };
         let (ValueRef::Blob(data) | ValueRef::Text(data)) = row.get_ref(3)? else { return Ok(()) };
+        let Some(room) = self.room.checked_sub(data.len() as u64) else { return Ok(()) };
+        self.room = room;
         // A number without a channel, if the database does not describe the topic.
         let channel = self.channels.get(&topic).copied().unwrap_or(0);
         // Sequence numbers count from 1 and wrap around.

@@ -5,7 +5,7 @@ use crate::reader::definitions::MOST_CHANNELS;
 use crate::reader::layout::Layout;
 use crate::schemas::{full_type_name, schema_text};
 use gridweave_runtime::message::Channel;
-use rusqlite::{Connection, OptionalExtension as _, Row};
+use rusqlite::{Connection, Row};
 use std::collections::BTreeMap;
 
 /// The name under which rosbag2 stores the bag's metadata.
@@ -64,23 +64,43 @@ pub(super) fn read_topics(
 
 /// A table of a database.
 pub(super) struct Table {
-    /// Its type, such as `table`, `view` or `virtual`.
-    kind: String,
     /// Whether its rows have no number.
     is_without_numbers: bool,
     /// Its columns in lower case, and whether each is computed.
     columns: BTreeMap<String, bool>,
 }
 
-/// The table with this name as SQLite understands it, whatever the schema calls it; `None` if there is none.
+/// Checks that nothing in the schema is a virtual table, whose rows are computed, or what no program writes.
+///
+/// # Errors
+/// The statement that is refused.
+pub(super) fn check_schema(connection: &Connection) -> Result<(), String> {
+    // SQLite stores statements with these first words, in this form.
+    let query = "SELECT substr(sql, 1, 40) FROM sqlite_schema WHERE sql IS NOT NULL AND NOT (sql LIKE 'CREATE TABLE %'
+        OR sql LIKE 'CREATE INDEX %' OR sql LIKE 'CREATE UNIQUE INDEX %' OR sql LIKE 'CREATE VIEW %'
+        OR sql LIKE 'CREATE TRIGGER %') LIMIT 1";
+    // The schema of a damaged database may end anywhere.
+    let refused: Option<String> = connection.query_row(query, [], |row| row.get(0)).unwrap_or_default();
+    match refused {
+        Some(statement) => Err(format!("its schema has `{statement}`, so it is not a rosbag2 bag")),
+        None => Ok(()),
+    }
+}
+
+/// The table with this name as SQLite understands it, whatever the schema calls it; `None` if there is none, or a view:
+/// views are not looked into, as a few that name each other twice take hours.
 pub(super) fn table(connection: &Connection, name: &str) -> rusqlite::Result<Option<Table>> {
-    let query = "SELECT type, wr FROM pragma_table_list WHERE schema = 'main' AND name = ?1 COLLATE NOCASE";
-    let described = connection.query_row(query, [name], |row| Ok((row.get(0)?, row.get(1)?))).optional()?;
-    let Some((kind, is_without_numbers)) = described else { return Ok(None) };
+    if !connection.table_exists(Some("main"), name)? {
+        return Ok(None);
+    }
     let mut statement = connection.prepare("SELECT name, hidden FROM pragma_table_xinfo(?1)")?;
     let column = |row: &Row<'_>| Ok((row.get::<_, String>(0)?.to_ascii_lowercase(), row.get::<_, i64>(1)? != 0));
     let columns = statement.query_map([name], column)?.collect::<rusqlite::Result<_>>()?;
-    Ok(Some(Table { kind, is_without_numbers, columns }))
+    let mut table = Table { is_without_numbers: false, columns };
+    let number = table.row_number();
+    table.is_without_numbers =
+        number.is_some_and(|number| connection.prepare(&format!("SELECT {number} FROM {name}")).is_err());
+    Ok(Some(table))
 }
 
 impl Table {
@@ -90,9 +110,6 @@ impl Table {
 
     /// The table, if all that it holds is stored in the file: what is computed has no limit.
     fn stored(self, name: &str) -> Result<Self, String> {
-        if self.kind != "table" {
-            return Err(format!("it has no table `{name}`, but a {}, so it is not a rosbag2 bag", self.kind));
-        }
         match self.columns.iter().find(|(_, is_computed)| **is_computed) {
             Some((column, _)) => {
                 Err(format!("the column `{column}` of its table `{name}` is computed, so it is not a rosbag2 bag"))

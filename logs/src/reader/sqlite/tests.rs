@@ -193,6 +193,9 @@ fn computed_columns_and_views_are_refused() {
             SELECT 1 FROM r) SELECT topic_id, 1 AS timestamp, NULL AS data FROM r' WHERE name = 'messages';";
     let text = error("view.db3", &format!("{topics}{messages}{renamed}"));
     assert!(text.contains("`messages`"), "{text}");
+    let text =
+        error("virtual.db3", &format!("{topics}CREATE VIRTUAL TABLE messages USING fts5(topic_id, timestamp, data);"));
+    assert!(text.contains("its schema has `CREATE VIRTUAL TABLE"), "{text}");
     // Definitions that are computed are not read.
     let definitions = "CREATE TABLE message_definitions(topic_type TEXT DEFAULT 'p/msg/X', encoding TEXT,
         encoded_message_definition TEXT AS (hex(zeroblob(400000000)))); INSERT INTO message_definitions DEFAULT VALUES;";
@@ -334,4 +337,38 @@ fn a_folder_is_read_with_or_without_metadata() {
     fs::remove_file(inner.join("bag_0.db3")).unwrap();
     describe("bag_0.db3, bag_1.db3");
     assert_eq!(times(), [4, 5]);
+}
+
+#[test]
+fn views_that_name_each_other_twice_take_no_time() {
+    let folder = Folder::new();
+    let mut statements = format!("{TABLES} CREATE VIEW v0 AS SELECT 1 AS x;");
+    for number in 1..60 {
+        let before = number - 1;
+        statements += &format!("CREATE VIEW v{number} AS SELECT a.x FROM v{before} AS a, v{before} AS b;");
+    }
+    statements += "INSERT INTO messages (topic_id, timestamp, data) VALUES (1, 1, x'00');";
+    assert_eq!(read_file(&database(&folder, "views.db3", &statements)).unwrap().0.len(), 1);
+}
+
+#[test]
+fn messages_that_a_default_value_gives_are_read_up_to_the_size_of_the_file() {
+    let folder = Folder::new();
+    let zeros = "00".repeat(100_000);
+    let statements = format!(
+        "{} WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 20000)
+            INSERT INTO messages (topic_id, timestamp) SELECT 1, i FROM n;
+        ALTER TABLE messages ADD COLUMN data BLOB DEFAULT x'{zeros}';",
+        TABLES.replace(", data BLOB NOT NULL", "")
+    );
+    // An index that claims that they are empty, and that it is the best one.
+    let index = "CREATE INDEX claims ON messages (id, timestamp, octet_length(data));
+        ANALYZE; UPDATE sqlite_stat1 SET stat = '1 1 1 1'; PRAGMA writable_schema = ON;";
+    for (name, more) in [("a.db3", ""), ("b.db3", index)] {
+        let path = database(&folder, name, &format!("{statements}{more}"));
+        let length = fs::metadata(&path).unwrap().len();
+        let (messages, damage) = read_file(&path).unwrap();
+        assert!(messages.iter().map(|(_, _, data)| data.len() as u64).sum::<u64>() <= length);
+        assert!(damage.len() < 20 && matches!(damage.last(), Some(Damage::ExcessRows { .. })), "{damage:?}");
+    }
 }
