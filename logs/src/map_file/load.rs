@@ -2,7 +2,7 @@
 
 use super::description::Description;
 use super::reading::Thresholds;
-use super::shades::Shades;
+use super::shades::{MOST_PIXELS, Shades};
 use super::{GridMap, MapFileError, MapFileWarning};
 use crate::file::folder_of;
 use gridweave_runtime::input_file;
@@ -31,6 +31,29 @@ pub fn load(yaml: &Path) -> Result<GridMap, MapFileError> {
 ///
 /// A file cannot be read, or is not a map.
 pub fn load_as(yaml: &Path, thresholds: Thresholds) -> Result<(GridMap, Option<MapFileWarning>), MapFileError> {
+    load_within(yaml, thresholds, &mut Room::default())
+}
+
+/// The number of pixels that the maps of a run may still have together.
+#[derive(Debug)]
+pub(crate) struct Room(pub(super) u64);
+
+impl Default for Room {
+    fn default() -> Self {
+        Self(MOST_PIXELS)
+    }
+}
+
+/// The same, if there is `room` for the map, which it takes.
+///
+/// # Errors
+///
+/// A file cannot be read, or is not a map, or there is no room for it.
+pub(crate) fn load_within(
+    yaml: &Path,
+    thresholds: Thresholds,
+    room: &mut Room,
+) -> Result<(GridMap, Option<MapFileWarning>), MapFileError> {
     let (description, missing) = describe(yaml)?;
     let Description { image: path, resolution, origin: [x, y, yaw], reading, assumed } = description;
     let wrong = |message: String| MapFileError::Image { path: path.clone(), yaml: yaml.to_owned(), message };
@@ -38,10 +61,11 @@ pub fn load_as(yaml: &Path, thresholds: Thresholds) -> Result<(GridMap, Option<M
         .map_err(image::ImageError::from)
         .and_then(|bytes| match unreadable_type(&bytes) {
             Some(why) => Err(io::Error::new(io::ErrorKind::InvalidData, why).into()),
-            None => Shades::decode(&bytes),
+            None => Shades::decode(&bytes, room.0),
         })
         .map_err(|error| wrong(error.to_string()))?;
     let (width, height) = shades.size();
+    room.0 = room.0.saturating_sub(u64::from(width) * u64::from(height));
     let origin = Pose::from(Isometry2::new(Vector2::new(x, y), yaw));
     let info = MapMetaData { resolution, width, height, origin, ..Default::default() };
     let (reading, warning) = match thresholds {
@@ -134,4 +158,29 @@ fn unreadable_type(bytes: &[u8]) -> Option<String> {
     let start = String::from_utf8_lossy(bytes.trim_ascii_start().get(..14).unwrap_or_default()).to_lowercase();
     let is_page = start.starts_with("<!doctype html") || start.starts_with("<html");
     is_page.then(|| "it is a page of HTML, and not the image; download the image itself".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn a_map_without_room_beside_those_before_it_is_refused_with_what_would_mend_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.yaml");
+        fs::write(folder.path().join("map.pgm"), b"P5 3 2 255 \x00\x64\xcd\xfe\xff\x32").unwrap();
+        let yaml =
+            "image: map.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25";
+        fs::write(&path, yaml).unwrap();
+        let mut room = Room(13);
+        for _ in 0..2 {
+            assert_eq!(load_within(&path, Thresholds::Literal, &mut room).unwrap().0.cells.len(), 6);
+        }
+        let text = load_within(&path, Thresholds::Literal, &mut room).unwrap_err().to_string();
+        assert!(
+            text.contains("3 x 2 pixels are more than the 1 that are left") && text.contains("crop them"),
+            "{text}"
+        );
+    }
 }

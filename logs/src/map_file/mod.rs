@@ -14,6 +14,7 @@ mod sink;
 mod warning;
 
 pub use error::MapFileError;
+pub(crate) use load::{Room, load_within};
 pub use load::{image_of, load, load_as};
 pub use reading::Thresholds;
 pub use save::{image_beside, save};

@@ -13,8 +13,10 @@ const DENSEST_PNG: u64 = 8 * 1032;
 const DENSEST_JPEG: u64 = 1024;
 /// The same for a BMP: a run of 255 pixels of three colours in two bytes.
 const DENSEST_BMP: u64 = 384;
-/// The maximum number of pixels of an image: 800 m by 800 m in cells of 0.05 m.
-const MOST_PIXELS: u64 = 1 << 28;
+/// The maximum number of pixels of an image, and of those of a run together: 800 m by 800 m in cells of 0.05 m.
+pub(super) const MOST_PIXELS: u64 = 1 << 28;
+/// The maximum size of a decoded image, bytes: the most pixels in 8 bits of red, green, blue and opacity.
+const LARGEST_DECODED: u64 = 4 * MOST_PIXELS;
 /// The maximum size of what a decoder keeps beside the pixels, such as texts and the colour profile, bytes.
 const LARGEST_PROFILE: u64 = 16 << 20;
 /// The number of bytes for a pixel beside the image: its cell, and that in the encoded map.
@@ -44,8 +46,8 @@ pub(super) fn is_transparent(opacity: f64, white: f64) -> bool {
 }
 
 impl Shades {
-    /// Decodes an image file: PGM, PPM, PBM, PNG, BMP or JPEG, recognised by its first bytes.
-    pub(super) fn decode(bytes: &[u8]) -> ImageResult<Self> {
+    /// Decodes an image file: PGM, PPM, PBM, PNG, BMP or JPEG, recognised by its first bytes. It has at most `room` pixels.
+    pub(super) fn decode(bytes: &[u8], room: u64) -> ImageResult<Self> {
         let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
         let mut limits = Limits::no_limits();
         limits.max_alloc = Some(LARGEST_PROFILE);
@@ -71,6 +73,17 @@ impl Shades {
         if pixels > MOST_PIXELS {
             return refuse(format!(
                 "it has {width} x {height} pixels, more than the maximum of {MOST_PIXELS}; crop it"
+            ));
+        }
+        if pixels > room {
+            return refuse(format!(
+                "its {width} x {height} pixels are more than the {room} that are left for it: the maps of a run have at most \
+                 {MOST_PIXELS} together; crop them to what is known"
+            ));
+        }
+        if decoder.total_bytes() > LARGEST_DECODED {
+            return refuse(format!(
+                "its {width} x {height} pixels take more than {LARGEST_DECODED} bytes; save it in grey of 8 bits"
             ));
         }
         let needed = decoder.total_bytes() + BYTES_BESIDE * pixels;

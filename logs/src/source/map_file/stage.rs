@@ -1,7 +1,7 @@
 //! The stage `map_file_source`.
 
 use super::{FileMaps, MapFileSourceParameters};
-use crate::map_file::{self, GridMap, Thresholds};
+use crate::map_file::{self, GridMap, Room, Thresholds};
 use crate::names::name_map_files;
 use crate::qos;
 use crate::robots::unit_of_map;
@@ -21,6 +21,7 @@ pub struct MapFileSource {
     /// Sorted by the robots' names, so that the order of the files does not matter.
     maps: Vec<NamedMap>,
     sent: usize,
+    room: Room,
 }
 
 /// A map, and the name of its robot.
@@ -72,7 +73,7 @@ impl MapFileSource {
         };
         let mut maps: Vec<NamedMap> = maps.map(named).collect();
         maps.sort_by(|one, other| one.robot.cmp(&other.robot));
-        Self { maps, sent: 0 }
+        Self { maps, sent: 0, room: Room::default() }
     }
 }
 
@@ -84,7 +85,7 @@ impl Source for MapFileSource {
         self.sent += 1;
         output.set_log_time(LogTime(self.sent as u64 * INTERVAL));
         // 0 is the channel of messages that no log describes.
-        map.send(self.sent as u32, output)?;
+        map.send(self.sent as u32, &mut self.room, output)?;
         Ok(self.sent < self.maps.len())
     }
 
@@ -94,12 +95,12 @@ impl Source for MapFileSource {
 }
 
 impl NamedMap {
-    /// Sends the map on a channel for itself, as a log would.
-    fn send(&self, channel_number: u32, output: &Output<FileMaps>) -> Result<(), StageError> {
+    /// Sends the map on a channel for itself, as a log would. A file takes of the `room` that there is for all.
+    fn send(&self, channel_number: u32, room: &mut Room, output: &Output<FileMaps>) -> Result<(), StageError> {
         match &self.map {
             Origin::Memory(map) => self.send_map(map, channel_number, output),
             Origin::File(file, thresholds, resolution) => {
-                let loaded = map_file::load_as(file, *thresholds);
+                let loaded = map_file::load_within(file, *thresholds, room);
                 let (mut map, warning) = loaded.map_err(|error| StageError::new("read a map file", error))?;
                 if let Some(warning) = warning {
                     output.warn(format!("{}: {warning}", file.display()));
