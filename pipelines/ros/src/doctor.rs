@@ -5,6 +5,7 @@ use super::definitions::Definitions;
 use super::discovery::doctor_subscriptions::DoctorSubscriptions;
 use super::discovery::node_identity::NodeIdentity;
 use super::discovery::publishers::{DiscoveredPublishers, Published, Topics};
+use super::discovery::running_merges::RunningMerges;
 use super::key_expression::NO_HASH;
 use super::node::Node;
 use super::qos::Qos;
@@ -40,9 +41,11 @@ fn look(parameters: toml::Table, longest: Duration) -> Result<String> {
     let name = NodeIdentity::of_program("doctor", parameters.node.as_ref());
     let mut node = Node::start(parameters.connection(), name.clone())?;
     let publishers = Arc::<Mutex<DiscoveredPublishers>>::default();
-    let to = Arc::clone(&publishers);
+    let merges = Arc::<Mutex<RunningMerges>>::default();
+    let (to, to_merges, own) = (Arc::clone(&publishers), Arc::clone(&merges), name.node.clone());
     node.watch(move |middleware, entity, is_there| {
         let owner = name.owner(&entity);
+        to_merges.lock().unwrap_or_else(PoisonError::into_inner).note(&entity, owner, is_there);
         to.lock().unwrap_or_else(PoisonError::into_inner).note(middleware, entity, owner, is_there);
     })?;
     let topics = || publishers.lock().unwrap_or_else(PoisonError::into_inner).topics();
@@ -56,11 +59,20 @@ fn look(parameters: toml::Table, longest: Duration) -> Result<String> {
     let topics = topics();
     let mut text = networks(&node);
     write_topics(&mut text, &topics, &definitions)?;
-    write_robots(&mut text, &Findings::new(&topics, &robots), &subscriptions, &robots)?;
+    let findings = Findings::new(&topics, &robots);
+    let running = merges.lock().unwrap_or_else(PoisonError::into_inner).text(&read_topics(&findings, &robots), &own);
+    write_robots(&mut text, &findings, running, &subscriptions, &robots)?;
     for problem in node.take_problems() {
         writeln!(text, "warning: {problem}")?;
     }
     Ok(text)
+}
+
+/// The topic by which a merge reads each robot.
+fn read_topics(findings: &Findings, robots: &RobotTopics) -> Vec<(String, String)> {
+    let with_maps = findings.maps.keys().map(|robot| (robot.clone(), robots.map.replace("{robot}", robot)));
+    let scanning = findings.scanning.keys().map(|robot| (robot.clone(), robots.scan.replace("{robot}", robot)));
+    with_maps.chain(scanning).collect()
 }
 
 /// Where it was looked.
@@ -101,10 +113,12 @@ fn write_topics(text: &mut String, topics: &Topics, definitions: &Definitions) -
     others.iter().try_for_each(|other| writeln!(text, "{other}"))
 }
 
-/// Says which robots have a map, what is missing for a merge, and what to write.
+/// Says which robots have a map, what is missing for a merge, and what to write; or which are merged by a run that is
+/// `running`.
 fn write_robots(
     text: &mut String,
     findings: &Findings,
+    running: Option<String>,
     subscriptions: &DoctorSubscriptions,
     robots: &RobotTopics,
 ) -> std::fmt::Result {
@@ -138,10 +152,13 @@ fn write_robots(
         writeln!(text, "warning: `{topic}` is no map, but {ros_type}")?;
     }
     let (with_map, with_scans) = (findings.maps.len(), findings.scanning.len());
-    match (with_map + with_scans >= 2, with_scans) {
-        (true, 0) => writeln!(text, "to merge these: gridweave-ros run live_ros")?,
-        (true, _) => writeln!(text, "to merge these, with maps drawn of scans: gridweave-ros run live_ros_scans")?,
-        (false, _) => {
+    match (running, with_map + with_scans >= 2, with_scans) {
+        (Some(running), ..) => writeln!(text, "{running}")?,
+        (None, true, 0) => writeln!(text, "to merge these: gridweave-ros run live_ros")?,
+        (None, true, _) => {
+            writeln!(text, "to merge these, with maps drawn of scans: gridweave-ros run live_ros_scans")?
+        }
+        (None, false, _) => {
             writeln!(text, "for a merge two robots must publish a map on `{}`; there are {with_map}", robots.map)?
         }
     }

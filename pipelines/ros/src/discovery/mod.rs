@@ -5,4 +5,5 @@ pub(crate) mod duplicate_publisher_warning;
 pub(crate) mod no_robot_warning;
 pub(crate) mod node_identity;
 pub(crate) mod publishers;
+pub(crate) mod running_merges;
 pub(crate) mod topics;
