@@ -267,13 +267,12 @@ impl RobotSurvey {
     /// Removes the robots whose maps are merged ones of other programs. Call it once all messages were added.
     pub(super) fn remove_merged_maps(&mut self) {
         let frames = std::mem::take(&mut self.map_frames);
-        let mut origin = |robot: &str, frame: &str| self.merged_maps.origin(robot, frame, &self.roles);
         // The frames of all robots decide.
         for (robot, (_, frame)) in &frames {
-            origin(robot, frame);
+            self.merged_maps.add_map(robot, frame);
         }
         for (robot, (topic, frame)) in &frames {
-            match origin(robot, frame) {
+            match self.merged_maps.origin(robot, frame, &self.roles) {
                 MapOrigin::Merged => {
                     self.notes.insert(left_out(topic, Some(&self.roles.robots_option(None))));
                     self.robots.remove(robot);

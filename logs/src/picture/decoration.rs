@@ -9,6 +9,9 @@ use crate::drawing::{Colour, Drawing, Group, Path, text, text_width};
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 
+/// The most maps that the legend names: of thousands it would be a hundred times as high as the maps.
+const MOST_NAMED: usize = 500;
+
 const INK: Colour = [0, 0, 0];
 const X_AXIS: Colour = [200, 30, 30];
 const Y_AXIS: Colour = [30, 150, 30];
@@ -26,6 +29,11 @@ pub(super) fn decorate(map: RgbImage, view: &View, scene: &Scene<'_>) -> Result<
 
     let maps = scene.maps.iter().filter(|map| scene.cells == Cells::Coloured && !map.name.is_empty());
     let mut entries: Vec<Entry<'_>> = maps.map(|map| Entry { words: map.name, colour: map.colour }).collect();
+    let others = format!("and {} more", entries.len().saturating_sub(MOST_NAMED));
+    if entries.len() > MOST_NAMED {
+        entries.truncate(MOST_NAMED);
+        entries.push(Entry { words: &others, colour: INK });
+    }
     for marks in scene.marks.iter().chain(&lines) {
         if let Some(colour) = marks.legend {
             let entry = Entry { words: &marks.name, colour };

@@ -251,3 +251,16 @@ fn marks_are_drawn_at_their_world_coordinates() {
     assert!(is_blue(57.0, 55.0) && is_blue(53.0, 55.0), "the ends of the long axis");
     assert!(is_blue(55.0, 56.5) && is_blue(51.0, 51.0) && !is_blue(58.5, 58.5));
 }
+
+#[test]
+fn the_legend_of_thousands_of_maps_names_the_first_ones_and_how_many_follow() {
+    let map = MapLayer { name: "robot", ..layer(info(2, 2, 0.1), &[0, 100, -1, 0]) };
+    let named = |count: usize| {
+        let picture = render_overlay(&vec![map; count], &[]).unwrap();
+        let legend = picture.drawing.groups.iter().find(|group| group.name == "legend").unwrap();
+        // A patch and a text for each.
+        legend.paths.len() / 2
+    };
+    // With a text that says how many follow.
+    assert_eq!([500, 501, 3000].map(named), [500, 501, 501]);
+}

@@ -116,6 +116,16 @@ impl RobotChannels {
         self.robots(|data| data.has_maps)
     }
 
+    /// Whether a robot has maps.
+    pub(crate) fn is_mapped(&self, robot: &str) -> bool {
+        self.data(robot).has_maps
+    }
+
+    /// Robots with maps and anything else, sorted by name.
+    pub(crate) fn mapped_with_more(&self) -> impl Iterator<Item = &str> {
+        self.robots(|data| data.has_maps && data.has_body)
+    }
+
     /// Whether a robot has anything but maps.
     pub(crate) fn has_more_than_maps(&self, robot: &str) -> bool {
         self.data(robot).has_body

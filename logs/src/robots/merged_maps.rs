@@ -87,23 +87,24 @@ impl MergedMaps {
         }
         let own = own(robot, frame);
         let others = || roles.mapped().filter(|other| *other != robot);
-        let certain = others().filter(|other| is_certain(other)).count();
-        let is_in_map_of = |other: &str| own.strip_prefix(other).is_some_and(|rest| rest.starts_with('/'));
-        let in_own_frame = |other: &&str| self.seen.get(*other).is_some_and(|frame| frame != WORLD);
-        let [robots, own_frames, unseen] = [
-            others().filter(|other| !is_merger(other)).count(),
-            others().filter(in_own_frame).count(),
-            others().filter(|other| !self.seen.contains_key(*other)).count(),
-        ];
+        // Of thousands of robots no more are looked at than decide.
+        let are_enough = |found: &mut dyn Iterator<Item = &str>| found.nth(Self::LEAST_PARTS - 1).is_some();
+        let may_be = |other: &&str| self.seen.get(*other).is_none_or(|frame| frame != WORLD);
+        let in_own_frame = |other: &&str| self.seen.contains_key(*other) && may_be(other);
+        let with_body = self.bodies.iter().map(String::as_str);
+        let with_body = with_body.filter(|other| roles.is_mapped(other) && !roles.has_more_than_maps(other));
+        let mut certain = roles.mapped_with_more().chain(with_body).filter(|other| *other != robot);
         // `map` is the name of every robot's own map frame.
-        let parts = others().filter(|other| (own != OWN || is_certain(other)) && self.is_child(robot, own, other));
+        let is_part = |other: &&str| (own != OWN || is_certain(other)) && self.is_child(robot, own, other);
+        let mut parts = others().filter(|_| !self.children.is_empty()).filter(is_part);
+        let mut places = own.match_indices('/').map(|(place, _)| &own[..place]);
         match () {
-            () if robots < Self::LEAST_PARTS => MapOrigin::Robot,
-            () if parts.count() >= Self::LEAST_PARTS => MapOrigin::Merged,
-            () if is_merger(robot) || others().any(is_in_map_of) => MapOrigin::Merged,
-            () if own == WORLD && own_frames >= Self::LEAST_PARTS => MapOrigin::Merged,
-            () if own == WORLD && own_frames + unseen >= Self::LEAST_PARTS => MapOrigin::Undecided,
-            () if certain >= Self::LEAST_PARTS => MapOrigin::Doubtful,
+            () if !are_enough(&mut others().filter(|other| !is_merger(other))) => MapOrigin::Robot,
+            () if are_enough(&mut parts) => MapOrigin::Merged,
+            () if is_merger(robot) || places.any(|other| other != robot && roles.is_mapped(other)) => MapOrigin::Merged,
+            () if own == WORLD && are_enough(&mut others().filter(in_own_frame)) => MapOrigin::Merged,
+            () if own == WORLD && are_enough(&mut others().filter(may_be)) => MapOrigin::Undecided,
+            () if are_enough(&mut certain) => MapOrigin::Doubtful,
             () => MapOrigin::Robot,
         }
     }

@@ -106,9 +106,9 @@ impl Peaks {
         centre: &Point2,
         parameters: &MapAlignerParameters,
     ) -> Option<&ScoredPose> {
+        let place = Place::new(pose, centre);
         let mut elsewhere = self.visited.iter().filter(|other| {
-            let (metres, radians) = change(pose, &other.transform_a_b, centre);
-            other.score > 0.0 && (metres > parameters.apart || radians.abs() > parameters.apart_yaw)
+            other.score > 0.0 && place.is_apart(&other.transform_a_b, parameters.apart, parameters.apart_yaw)
         });
         elsewhere.next()
     }
@@ -124,16 +124,16 @@ fn apart_from_better(
     least_wall: f64,
 ) -> Vec<(Pose2, Point2)> {
     let mut kept: Vec<(Pose2, Point2)> = Vec::new();
+    let mut places: Vec<Place> = Vec::new();
     for ScoredPose { transform_a_b, .. } in poses {
-        let is_apart = |(other, centre): &(Pose2, Point2)| {
-            let (shift, turn) = change(other, transform_a_b, centre);
-            shift > parameters.apart || turn.abs() > radians
-        };
-        if kept.iter().all(is_apart) {
+        if places.iter().all(|place| place.is_apart(transform_a_b, parameters.apart, radians)) {
             let common = overlay.common_walls(transform_a_b);
             let common = common.filter(|common| common.length >= least_wall);
             let common = common.filter(|common| common.faced_length >= FACED * common.length);
-            kept.extend(common.map(|common| (*transform_a_b, common.centre)));
+            if let Some(common) = common {
+                kept.push((*transform_a_b, common.centre));
+                places.push(Place::new(transform_a_b, &common.centre));
+            }
         }
         if kept.len() == CANDIDATES {
             break;
@@ -147,12 +147,39 @@ pub(crate) fn overlay<'a>(a: &'a PreparedMap, b: &'a PreparedMap, level: usize, 
     Overlay { a: a.level(level), b: b.level(level), walls_a: a.walls(), walls_b: b.walls(), penalty }
 }
 
+/// A pose, and a point of map b there, with which many poses are compared.
+struct Place {
+    yaw: f64,
+    /// The point in frame a and in frame b.
+    centre_a: Point2,
+    centre_b: Point2,
+}
+
+impl Place {
+    fn new(transform_a_b: &Pose2, centre: &Point2) -> Self {
+        let centre_b = transform_a_b.inverse() * centre;
+        Self { yaw: transform_a_b.rotation.angle(), centre_a: *centre, centre_b }
+    }
+
+    /// Whether the point is more than `apart` away at another pose, or that is turned by more than `radians`.
+    fn is_apart(&self, other: &Pose2, apart: f64, radians: f64) -> bool {
+        self.shift(other) > apart || self.turn(other).abs() > radians
+    }
+
+    fn shift(&self, other: &Pose2) -> f64 {
+        (other * self.centre_b - self.centre_a).norm()
+    }
+
+    fn turn(&self, other: &Pose2) -> f64 {
+        turn_difference(other.rotation.angle(), self.yaw, TAU)
+    }
+}
+
 /// Distance of a point of map b, at `centre` in frame a, from one transform to another, metres, and the rotation,
 /// radians.
 pub(super) fn change(one: &Pose2, other: &Pose2, centre: &Point2) -> (f64, f64) {
-    let moved = other * (one.inverse() * centre);
-    let turn = turn_difference(other.rotation.angle(), one.rotation.angle(), TAU);
-    ((moved - centre).norm(), turn)
+    let place = Place::new(one, centre);
+    (place.shift(other), place.turn(other))
 }
 
 /// Whether two poses are the same, where `centre` is the centroid of the common walls at the first.
