@@ -87,6 +87,11 @@ enum Command {
 }
 
 impl Command {
+    /// Whether the command has outputs that it would write again from the start, and does not end in order.
+    fn writes_again(&self) -> bool {
+        matches!(self, Self::Recover(_) | Self::Render(_) | Self::Report(_))
+    }
+
     /// Whether the command has outputs that must be closed when it is interrupted.
     fn must_end_in_order(&self) -> bool {
         matches!(
@@ -130,6 +135,9 @@ impl Cli {
     fn run(self, command: &clap::Command, program: &str, registry: &Registry) -> Result<Status> {
         if self.command.must_end_in_order() {
             interrupt::hold_back();
+        }
+        if self.command.writes_again() {
+            interrupt::remove_on_interrupt();
         }
         match self.command {
             Command::Run(args) => run::run(&args, registry),

@@ -64,6 +64,13 @@ pub(crate) fn stop_replay_on_interrupt() -> &'static AtomicBool {
     stop_on_interrupt(OUTPUT_IS_CLOSED)
 }
 
+/// Makes a signal end the program at once, without what it has begun to write: for commands whose input is still there.
+pub(crate) fn remove_on_interrupt() {
+    if let Err(error) = ctrlc::set_handler(|| left_behind::end_process(130)) {
+        tracing::warn!("what is written is left as NAME.part on an interrupt: {error}");
+    }
+}
+
 fn interrupt(what_follows: &str) {
     let is_replay = IS_REPLAY.load(Ordering::Relaxed);
     if INTERRUPTED.swap(true, Ordering::Relaxed) {

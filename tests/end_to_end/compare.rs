@@ -91,7 +91,8 @@ fn a_run_that_fails_does_not_end_the_others_and_is_reported() {
     let (broken, truth) = (folder.path().join("logs/broken.mcap"), folder.path().join("logs/broken.truth.json"));
     fs::write(broken, b"this is not a log, for sure").unwrap();
     fs::copy(folder.path().join("logs/one.truth.json"), truth).unwrap();
-    let ended = compare(folder.path(), &["--pipelines", "tag_only", "--inputs", "logs"]);
+    // More jobs than runs, than threads that a system has, and than addresses.
+    let ended = compare(folder.path(), &["--pipelines", "tag_only", "--inputs", "logs", "--jobs", "1000000000000"]);
     ended.assert(1, &["failed: tag_only on broken, seed 1: error", "1 of 1"]);
     let lines: Vec<&str> = ended.stdout.lines().map(str::trim).filter(|line| line.starts_with("tag_only")).collect();
     assert_eq!(lines.len(), 4, "{ended:#?}");

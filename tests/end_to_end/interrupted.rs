@@ -62,6 +62,21 @@ fn the_output_can_be_read_and_says_that_it_is_not_complete() {
     }
 }
 
+#[test]
+fn a_recovery_that_is_interrupted_leaves_the_earlier_file_and_no_part() {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("endless.toml"), ENDLESS.replace("count = 1_000_000_000", "count = 300_000")).unwrap();
+    gridweave(folder.path(), &["run", "endless.toml", "-o", "log.mcap"]).assert(0, &[]);
+    let output = folder.path().join("whole.mcap");
+    fs::write(&output, "earlier").unwrap();
+    let run = start(folder.path(), &["recover", "log.mcap", "-o", "whole.mcap"], &[]);
+    wait_until("output", || part(&output).exists() || fs::metadata(&output).is_ok_and(|file| file.len() > 100));
+    signal(run.id(), "TERM");
+    let status = run.wait().status;
+    assert!(!part(&output).exists());
+    assert_eq!(status != 0, fs::read(&output).unwrap() == b"earlier", "{status}");
+}
+
 /// A stage that works for ever on its first message.
 const LONG_CALL: &str = r#"
 [pipeline]

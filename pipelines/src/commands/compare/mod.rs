@@ -138,7 +138,8 @@ fn run_all(args: &CompareArgs, cases: &[Case], folder: &Path) -> Result<Vec<Merg
         .flat_map(|(pipeline, case)| (1..=args.seeds).map(move |seed| (pipeline, case, seed)))
         .map(|(pipeline, case, seed)| Merge { pipeline, file: &args.pipelines[pipeline], case, seed })
         .collect();
-    let threads = args.jobs.map_or(0, NonZeroUsize::get);
+    // More threads than runs would have nothing to do.
+    let threads = args.jobs.map_or(0, |jobs| jobs.get().min(merges.len().max(1)));
     let pool =
         rayon::ThreadPoolBuilder::new().num_threads(threads).build().context("cannot start threads for the runs")?;
     let stop = stop_on_interrupt("no more runs are started, and those in progress are completed");

@@ -15,6 +15,9 @@ use nalgebra::Isometry2;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
+/// The most robots of which an error tells the size of the cells.
+const MOST_SIZES: usize = 5;
+
 /// Arguments of `gridweave render`.
 #[derive(Debug, Args)]
 pub(crate) struct RenderArgs {
@@ -145,11 +148,11 @@ fn explain(error: PictureError, is_merged_map: bool, state: &MergeState) -> anyh
             )
         }
         PictureError::Empty if !is_merged_map => {
-            let sizes =
-                state.robots_with_maps().map(|(robot, map)| format!("{} m in that of {robot}", map.info.resolution));
+            let sizes = state.robots_with_maps().take(MOST_SIZES);
+            let sizes = sizes.map(|(robot, map)| format!("{} m in that of {robot}", map.info.resolution));
             anyhow::anyhow!(
-                "nothing of the maps can be drawn: all cells are unknown, or are too large to be those of a building ({}); check \
-                 the `resolution` of each",
+                "nothing of the maps can be drawn: all cells are unknown, are too large to be those of a building ({}), or have no \
+                 place; check the `resolution` and the `origin` of each",
                 sizes.collect::<Vec<_>>().join(", ")
             )
         }
