@@ -1,7 +1,10 @@
 //! Robot poses from tf, the tree of frames that ROS programs publish edge by edge.
 
+mod components;
+
 use crate::robot_name::fits;
 use crate::schemas::full_type_name;
+use components::Components;
 use gridweave_runtime::message::Channel;
 use gridweave_runtime::ros::{Header, Point, Pose, PoseStamped, Quaternion, RosMessage, TFMessage, Time, Transform};
 use gridweave_runtime::stage::{TfFrames, frame_of_robot, match_robot};
@@ -56,23 +59,28 @@ impl FrameTree {
     /// Adds an edge, replacing that of the child frame. Returns `false` if it is invalid: a value is not finite, or
     /// parent and child are the same frame.
     pub fn insert(&mut self, parent: &str, child: &str, transform: &Transform, is_static: bool) -> bool {
-        let Some(transform_parent_child) = isometry(transform).filter(|_| parent != child && !child.is_empty()) else {
-            return false;
-        };
-        match self.edges.get_mut(child) {
+        self.add(parent, child, transform, is_static).is_some()
+    }
+
+    /// The same. Returns whether the frames are connected otherwise than before; `None` if the edge is invalid.
+    fn add(&mut self, parent: &str, child: &str, transform: &Transform, is_static: bool) -> Option<bool> {
+        let transform_parent_child = isometry(transform).filter(|_| parent != child && !child.is_empty())?;
+        Some(match self.edges.get_mut(child) {
             Some(edge) => {
                 edge.transform_parent_child = transform_parent_child;
                 edge.is_static = is_static;
-                if edge.parent != parent {
+                let has_moved = edge.parent != parent;
+                if has_moved {
                     parent.clone_into(&mut edge.parent);
                 }
+                has_moved
             }
             None => {
                 let edge = Edge { parent: parent.to_owned(), transform_parent_child, is_static };
                 self.edges.insert(child.to_owned(), edge);
+                true
             }
-        }
-        true
+        })
     }
 
     /// The pose of the frame `source` in the frame `target`; `None` if they are not connected, or by more than 1000
@@ -144,8 +152,32 @@ pub struct TfPoses {
     /// The frame patterns of robots that are not known yet.
     frames: Option<TfFrames>,
     tree: FrameTree,
+    components: Components,
     /// The known robots: with `frames`, those of which one of the two frames was seen.
-    robots: BTreeMap<String, PoseFrames>,
+    robots: BTreeMap<String, KnownRobot>,
+}
+
+/// A robot, with the numbers of its frames in the components.
+#[derive(Clone, Debug)]
+struct KnownRobot {
+    frames: PoseFrames,
+    map: usize,
+    bases: Vec<usize>,
+}
+
+impl KnownRobot {
+    fn new(frames: PoseFrames, components: &mut Components) -> Self {
+        let map = components.number(&frames.map);
+        let bases = frames.bases.iter().map(|base| components.number(base)).collect();
+        Self { frames, map, bases }
+    }
+
+    /// Whether transforms in some sets of frames may have moved a base in the map, or have shown which base it is.
+    fn may_have_moved(&self, components: &Components, changed: &BTreeSet<usize>) -> bool {
+        let set = components.set_of(self.map);
+        let is_connected = self.bases.iter().any(|base| components.set_of(*base) == set);
+        is_connected && (self.bases.len() > 1 || changed.contains(&set))
+    }
 }
 
 /// The frames between which a robot's pose is looked up.
@@ -166,9 +198,10 @@ impl TfPoses {
     /// Sets the robots to derive poses of. Known base frames are kept.
     pub fn set_robots(&mut self, robots: BTreeMap<String, PoseFrames>) {
         let mut known = std::mem::take(&mut self.robots);
+        let components = &mut self.components;
         let with_known = robots.into_iter().map(|(robot, pose_frames)| {
-            let pose_frames = known.remove(&robot).unwrap_or(pose_frames);
-            (robot, pose_frames)
+            let known = known.remove(&robot).unwrap_or_else(|| KnownRobot::new(pose_frames, components));
+            (robot, known)
         });
         self.robots = with_known.collect();
     }
@@ -186,9 +219,12 @@ impl TfPoses {
         for edge in &message.transforms {
             let parent = frame_of_robot(prefix, &edge.header.frame_id);
             let child = frame_of_robot(prefix, &edge.child_frame_id);
-            if !self.tree.insert(&parent, &child, &edge.transform, is_static) {
+            let Some(is_new) = self.tree.add(&parent, &child, &edge.transform, is_static) else {
                 unusable += 1;
                 continue;
+            };
+            if is_new {
+                self.components.connect(&parent, &child);
             }
             self.recognise(&parent);
             self.recognise(&child);
@@ -206,17 +242,26 @@ impl TfPoses {
             {
                 let named = |pattern: &str| pattern.replace("{robot}", robot);
                 let pose_frames = PoseFrames { map: named(&frames.map_frame), bases: vec![named(&frames.base_frame)] };
-                self.robots.insert(robot.to_owned(), pose_frames);
+                let known = KnownRobot::new(pose_frames, &mut self.components);
+                self.robots.insert(robot.to_owned(), known);
             }
         }
     }
 
     fn poses(&mut self, changed: &BTreeMap<String, Time>) -> Vec<(String, PoseStamped)> {
-        let tree = &self.tree;
-        let pose_of = |(robot, pose_frames): (&String, &mut PoseFrames)| {
+        let (tree, components) = (&self.tree, &mut self.components);
+        let numbers: Vec<usize> = changed.keys().map(|frame| components.number(frame)).collect();
+        let sets: BTreeSet<usize> = numbers.into_iter().map(|number| components.set_of(number)).collect();
+        let pose_of = |(robot, known): (&String, &mut KnownRobot)| {
+            if !known.may_have_moved(components, &sets) {
+                return None;
+            }
+            let pose_frames = &mut known.frames;
             if pose_frames.bases.len() > 1 {
-                let connected = pose_frames.bases.iter().find(|base| tree.chain(&pose_frames.map, base).is_some())?;
-                pose_frames.bases = vec![connected.clone()];
+                let is_connected = |base: &String| tree.chain(&pose_frames.map, base).is_some();
+                let connected = pose_frames.bases.iter().position(is_connected)?;
+                pose_frames.bases = vec![pose_frames.bases.swap_remove(connected)];
+                known.bases = vec![known.bases.swap_remove(connected)];
             }
             let chain = tree.chain(&pose_frames.map, pose_frames.bases.first()?)?;
             let stamp = changed.get(tree.moving(&chain)?)?;
@@ -238,19 +283,20 @@ impl TfPoses {
 
     /// The map frame of a robot.
     pub fn map_frame(&self, robot: &str) -> Option<&str> {
-        self.robots.get(robot).map(|pose_frames| pose_frames.map.as_str())
+        self.robots.get(robot).map(|known| known.frames.map.as_str())
     }
 
     /// Sets the map frame of a robot.
     pub fn set_map_frame(&mut self, robot: &str, frame: &str) {
-        if let Some(pose_frames) = self.robots.get_mut(robot) {
-            frame.clone_into(&mut pose_frames.map);
+        if let Some(known) = self.robots.get_mut(robot) {
+            frame.clone_into(&mut known.frames.map);
+            known.map = self.components.number(frame);
         }
     }
 
     /// The base frame of a robot, once it is known which of several it is.
     pub fn base_of(&self, robot: &str) -> Option<&str> {
-        match &self.robots.get(robot)?.bases[..] {
+        match &self.robots.get(robot)?.frames.bases[..] {
             [base] => Some(base),
             _ => None,
         }
@@ -258,9 +304,7 @@ impl TfPoses {
 
     /// Whether any transform was added that ties the map frame of a robot to another frame.
     pub fn has_map_frame(&self, robot: &str) -> bool {
-        let is_end =
-            |map: &str| self.tree.edges.contains_key(map) || self.tree.edges.values().any(|edge| edge.parent == map);
-        self.map_frame(robot).is_some_and(is_end)
+        self.robots.get(robot).is_some_and(|known| self.components.is_connected(known.map))
     }
 
     /// Whether any transform was added.
@@ -270,8 +314,9 @@ impl TfPoses {
 
     /// The robots of which a frame was seen and whose base was never connected to their map.
     pub fn robots_without_pose(&self) -> BTreeSet<&str> {
-        let unconnected = |(_, pose_frames): &(&String, &PoseFrames)| {
-            pose_frames.bases.iter().all(|base| self.tree.chain(&pose_frames.map, base).is_none())
+        let unconnected = |(_, known): &(&String, &KnownRobot)| {
+            let PoseFrames { map, bases } = &known.frames;
+            bases.iter().all(|base| self.tree.chain(map, base).is_none())
         };
         self.robots.iter().filter(unconnected).map(|(robot, _)| robot.as_str()).collect()
     }

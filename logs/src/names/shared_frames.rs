@@ -93,18 +93,19 @@ impl SharedFrames {
         }
         let mut unnamed: BTreeSet<&String> = shared.of_map.values().flatten().collect();
         shared.only = unnamed.pop_first().filter(|_| unnamed.is_empty()).cloned();
-        // Each round goes up by one frame at the least, or is the last.
-        let mut above: BTreeSet<String> = BTreeSet::new();
-        let is_map = |frame: &String| shared.of_map.contains_key(frame) || shared.robot_of(frame).is_some();
-        loop {
-            let higher = |(parent, child): &&(String, String)| {
-                !above.contains(parent) && !is_map(parent) && (is_map(child) || above.contains(child))
-            };
-            let more: Vec<String> = edges.iter().filter(higher).map(|(parent, _)| parent.clone()).collect();
-            if more.is_empty() {
-                break;
+        let mut parents: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+        for (parent, child) in edges {
+            parents.entry(child).or_default().push(parent);
+        }
+        let is_map = |frame: &str| shared.of_map.contains_key(frame) || shared.robot_of(frame).is_some();
+        let mut above = BTreeSet::new();
+        let mut pending: Vec<&str> = parents.keys().copied().filter(|child| is_map(child)).collect();
+        while let Some(child) = pending.pop() {
+            for &parent in parents.get(child).into_iter().flatten() {
+                if !is_map(parent) && above.insert(parent.to_owned()) {
+                    pending.push(parent);
+                }
             }
-            above.extend(more);
         }
         shared.above = above;
         (!shared.of_map.is_empty()).then_some(shared)
@@ -112,9 +113,7 @@ impl SharedFrames {
 
     /// The robot whose name a frame has.
     fn robot_of(&self, frame: &str) -> Option<&String> {
-        self.robots
-            .iter()
-            .find(|robot| frame.strip_prefix(robot.as_str()).is_some_and(|rest| rest.starts_with(['/', '_'])))
+        frame.match_indices(['/', '_']).find_map(|(place, _)| self.robots.get(&frame[..place]))
     }
 
     /// The names of the parent and the child of a transform.
@@ -195,6 +194,16 @@ mod tests {
         for stays in [("world", "b/map"), ("b/map", "b/odom"), ("earth", "world")] {
             assert_edge(&shared, stays, stays);
         }
+    }
+
+    #[test]
+    fn a_long_chain_of_frames_above_a_map_takes_no_time() {
+        let names: Vec<String> = (0..100_000).map(|number| format!("f{number:06}")).collect();
+        let mut edges: Vec<(&str, &str)> = names.windows(2).map(|two| (two[0].as_str(), two[1].as_str())).collect();
+        edges.push((&names[99_999], "map"));
+        let shared = shared(&[("a", "map"), ("b", "b/map")], &edges).unwrap();
+        assert_edge(&shared, ("f000000", "f000001"), ("f000000", "f000001"));
+        assert_edge(&shared, ("map", "odom"), ("a/map", "a/odom"));
     }
 
     #[test]

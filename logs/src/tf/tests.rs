@@ -184,3 +184,20 @@ fn a_zero_quaternion_is_no_rotation_and_a_tilted_frame_is_respected() {
     assert!((base.translation.vector - nalgebra::Vector3::new(2.0, -1.0, 0.0)).norm() < 1e-12);
     assert!(base.rotation.angle() < 1e-9);
 }
+
+/// Each message moves one robot, and the others are not looked up: 9 million chains would take a minute.
+#[test]
+fn thousands_of_robots_with_transforms_of_their_own_have_their_poses() {
+    let mut tf = robots();
+    let count = 3000;
+    let mut found = 0;
+    for number in 0..count {
+        let frame = |name: &str| format!("r{number}/{name}");
+        let edges = [("odom", "base_link"), ("map", "odom")].map(|(parent, child)| (frame(parent), frame(child)));
+        found +=
+            tf.update("", false, &message(edges.map(|(parent, child)| edge(&parent, &child, 1.0, 0.0, 0.0)))).0.len();
+    }
+    assert_eq!(found, count);
+    // A tie between the trees of two robots moves neither of their bases.
+    assert!(tf.update("", false, &message([edge("world", "r1/map", 1.0, 0.0, 0.0)])).0.is_empty());
+}
