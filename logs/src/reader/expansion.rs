@@ -13,7 +13,7 @@ const LARGEST_RATIO: u64 = 1024;
 /// Drops the blocks at the end of a file of `length` bytes whose contents are too much together with those before.
 /// Returns the damage that is reported for them.
 pub(crate) fn drop_excess(blocks: &mut Vec<Block>, length: usize) -> impl Iterator<Item = Damage> {
-    let most = LARGEST_ANYWAY.max(LARGEST_RATIO.saturating_mul(length as u64));
+    let most = most_contents(length as u64);
     let mut size = 0_u64;
     let fits = |block: &&Block| {
         // A chunk that claims more than one may have is not unpacked.
@@ -24,6 +24,11 @@ pub(crate) fn drop_excess(blocks: &mut Vec<Block>, length: usize) -> impl Iterat
     let dropped = blocks.len() - kept;
     blocks.truncate(kept);
     std::iter::repeat_n(Damage::BadChunk { fault: ChunkFault::Expansion }, dropped.min(MOST_REPORTS))
+}
+
+/// The maximum size of the contents of a file of `length` bytes.
+pub(crate) fn most_contents(length: u64) -> u64 {
+    LARGEST_ANYWAY.max(LARGEST_RATIO.saturating_mul(length))
 }
 
 /// The limit in words.

@@ -160,6 +160,12 @@ impl LogReader {
         self.prefetcher.limit_held(most);
     }
 
+    /// Sets the number of bytes that individually compressed messages of each file take together at most.
+    #[cfg(test)]
+    pub(crate) fn limit_unpacked(&mut self, most: u64) {
+        self.prefetcher.limit_unpacked(most);
+    }
+
     /// The files, in the order that breaks ties.
     pub fn files(&self) -> &Arc<[LogFile]> {
         &self.files

@@ -4,6 +4,7 @@
 
 use super::block::{Block, LoadedBlock, Memory};
 use super::damage::{ChunkFault, LARGEST, LARGEST_OVERLAP};
+use super::expansion::most_contents;
 use super::file::LogFile;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
@@ -41,6 +42,9 @@ pub(crate) struct Prefetcher {
     spare: Vec<Memory>,
     /// The files that contain individually compressed messages.
     decompressed: BTreeSet<usize>,
+    /// The number of bytes that such messages of each file may still take, in all blocks together: none once one had no
+    /// room.
+    room_to_unpack: Vec<u64>,
 }
 
 struct Started {
@@ -64,6 +68,7 @@ impl Prefetcher {
             .collect();
         order.sort_by_key(|id| (files[id.file].layout.blocks[id.block].first_time, *id));
         let threads = std::thread::available_parallelism().map_or(1, usize::from).min(8);
+        let room_to_unpack = files.iter().map(|file| most_contents(file.size())).collect();
         Self {
             files,
             order,
@@ -75,6 +80,7 @@ impl Prefetcher {
             depth: threads + 1,
             spare: Vec::new(),
             decompressed: BTreeSet::new(),
+            room_to_unpack,
         }
     }
 
@@ -100,6 +106,12 @@ impl Prefetcher {
         self.most_held = most;
     }
 
+    /// Sets the number of bytes that individually compressed messages of each file take together at most.
+    #[cfg(test)]
+    pub(crate) fn limit_unpacked(&mut self, most: u64) {
+        self.room_to_unpack.fill(most);
+    }
+
     /// The least log time in the block that [`take`](Self::take) returns next.
     pub(crate) fn next_time(&self) -> Option<u64> {
         let id = self.started.front().map(|started| started.id).or_else(|| self.order.get(self.next).copied())?;
@@ -113,19 +125,23 @@ impl Prefetcher {
         self.started_bytes -= size;
         // Whether a block has room does not depend on how many were prefetched, which depends on the number of
         // processors.
+        let is_full = self.room_to_unpack.get(id.file) == Some(&0);
         let load = match load {
             Loading::Thread(thread) => match thread.join().unwrap_or(Err(ChunkFault::Records)) {
                 // A thread panics only on a block that cannot be read.
+                _ if is_full => Err(ChunkFault::Expansion),
                 _ if !self.has_room(size) => Err(ChunkFault::Overlap),
                 // Its messages are compressed individually, and take more than threads may load together.
                 Err(ChunkFault::TooMuch { .. }) => self.load(id, size),
                 load => load,
             },
+            Loading::Later if is_full => Err(ChunkFault::Expansion),
             Loading::Later if !self.has_room(size) => Err(ChunkFault::Overlap),
             Loading::Later => self.load(id, size),
         };
         let load =
             load.and_then(|block| if self.has_room(block.size()) { Ok(block) } else { Err(ChunkFault::Overlap) });
+        let load = load.and_then(|block| self.take_room(id.file, block));
         if let Ok(block) = &load {
             self.held_bytes += block.size();
             if block.is_decompressed {
@@ -135,6 +151,13 @@ impl Prefetcher {
         self.start_all();
         let expected = self.block(id).map_or(size, Block::size);
         Some((id, expected, load))
+    }
+
+    /// The block, if its messages are not compressed individually, or there is room for them.
+    fn take_room(&mut self, file: usize, block: LoadedBlock) -> Load {
+        let Some(room) = self.room_to_unpack.get_mut(file).filter(|_| block.is_decompressed) else { return Ok(block) };
+        *room = room.saturating_sub(block.size());
+        if *room > 0 { Ok(block) } else { Err(ChunkFault::Expansion) }
     }
 
     /// Whether so many bytes may be held beside those that are; one block always may.

@@ -210,3 +210,20 @@ fn chunks_that_overlap_in_time_take_limited_memory_and_the_others_are_reported()
         assert_eq!((seen.len(), damage), (11, Vec::new()));
     }
 }
+
+#[test]
+fn individually_compressed_messages_take_limited_room_in_all_chunks_together() {
+    let folder = Folder::new();
+    let plain = vec![0; 400 << 10];
+    let packed = zstd::bulk::compress(&plain, 1).unwrap();
+    let [_, bare, _, zstd] = layouts();
+    for (options, data, read) in [(&bare, &packed, 4), (&zstd, &packed, 4), (&zstd, &plain, 11)] {
+        let path = folder.write("a.mcap", &chunks(options, |chunk| [10 * chunk, 10 * chunk + 5], data));
+        let mut reader = LogReader::new(vec![LogFile::open(path).unwrap()]);
+        reader.limit_unpacked(2 << 20);
+        let (seen, damage) = read_all(reader);
+        assert_eq!(seen.len(), read);
+        let lost = if read < 11 { 4 } else { 0 };
+        assert_eq!(damage, vec![Damage::BadChunk { fault: ChunkFault::Expansion }; lost], "the rest is not unpacked");
+    }
+}
