@@ -5,17 +5,20 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-/// The time that a stage has for the rest of its call.
+/// The time that a call has to end.
 const GRACE: Duration = Duration::from_millis(1200);
-/// The interval at which the calls are looked at afterwards.
+/// The interval at which the calls are looked at.
 const INTERVAL: Duration = Duration::from_millis(50);
 
 /// The number of calls of stages that are in progress.
 static WORKING: AtomicUsize = AtomicUsize::new(0);
 /// The number of stages that are closing their outputs, as the run has failed.
 static CLOSING: AtomicUsize = AtomicUsize::new(0);
+
+/// The number of beginnings and ends of calls.
+static EVENTS: AtomicUsize = AtomicUsize::new(0);
 
 /// A call that is in progress.
 pub(super) struct Call(&'static AtomicUsize);
@@ -33,6 +36,7 @@ impl Call {
 
     fn of(count: &'static AtomicUsize) -> Self {
         count.fetch_add(1, Ordering::Relaxed);
+        EVENTS.fetch_add(1, Ordering::Relaxed);
         Self(count)
     }
 }
@@ -40,14 +44,24 @@ impl Call {
 impl Drop for Call {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
+        EVENTS.fetch_add(1, Ordering::Relaxed);
     }
 }
 
 /// Waits, from the moment at which the run was asked to stop, until nothing but a long call keeps this process from
-/// its end. Returns after a little more than a second, unless outputs are being closed, and never if no stage works.
+/// its end: until a stage works, none closes its outputs, and no call has begun or ended for more than a second. Never
+/// returns if the run ends in order.
 pub fn wait_for_long_call() {
-    thread::sleep(GRACE);
-    while WORKING.load(Ordering::Relaxed) == 0 || CLOSING.load(Ordering::Relaxed) > 0 {
+    let (mut events, mut since) = (EVENTS.load(Ordering::Relaxed), Instant::now());
+    loop {
         thread::sleep(INTERVAL);
+        let now = EVENTS.load(Ordering::Relaxed);
+        if now != events {
+            (events, since) = (now, Instant::now());
+        }
+        let is_working = WORKING.load(Ordering::Relaxed) > 0 && CLOSING.load(Ordering::Relaxed) == 0;
+        if is_working && since.elapsed() > GRACE {
+            return;
+        }
     }
 }

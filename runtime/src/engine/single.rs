@@ -77,11 +77,14 @@ fn drive(pipeline: &Pipeline, stages: &mut [SingleStage], observer: &dyn Observe
         if let Some(share) = stages[source].runner.progress().map_err(failed(source))? {
             observer.progress(&pipeline.stages[source].name, share, stages[source].reached());
         }
+        for (index, stage) in stages.iter_mut().enumerate() {
+            // A source or the stage before may have worked for long.
+            if !observer.should_stop() {
+                stage.handle_all(observer).map_err(failed(index))?;
+            }
+        }
         if observer.should_stop() {
             return Err(RunError::of_run(Failure::Interrupted));
-        }
-        for (index, stage) in stages.iter_mut().enumerate() {
-            stage.handle_all().map_err(failed(index))?;
         }
     }
     Ok(())
@@ -113,14 +116,19 @@ impl SingleStage {
         Ok(())
     }
 
-    fn handle_all(&mut self) -> Result<(), Failure> {
+    /// Handles all pending messages, unless the run is to stop.
+    fn handle_all(&mut self, observer: &dyn Observer) -> Result<(), Failure> {
         if self.done || self.runner.is_source() {
             return Ok(());
         }
         for (queue, inbox) in self.queues.iter_mut().zip(&self.inbox) {
             queue.append(&mut inbox.borrow_mut());
         }
-        while self.runner.handle_next(&mut self.queues)?.is_some() {}
+        while self.runner.handle_next(&mut self.queues)?.is_some() {
+            if observer.should_stop() {
+                return Ok(());
+            }
+        }
         self.runner.check_pending(&self.queues)?;
         match lower_bound(&self.queues) {
             Some(watermark) => self.links.iter().for_each(|link| link.raise(watermark)),
