@@ -88,6 +88,6 @@ fn interrupt(what_follows: &str) {
 
 fn end_without_long_call() {
     wait_for_long_call();
-    eprint_line("error: the run was interrupted in the work of a stage; what it had begun to write was removed");
+    eprint_line("error: the run was interrupted in the work of a stage; outputs that were not closed yet are removed");
     left_behind::end_process(1);
 }
