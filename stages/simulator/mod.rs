@@ -7,8 +7,7 @@
 //! by bit, on any number of threads: every random quantity has its own stream of random numbers.
 //!
 //! The source `simulator` sends the simulation as the messages of a log: `/robotN/map`, `/robotN/pose`,
-//! `/robotN/tag_ranges` and `/tf`, `/robotN/scan` and `/robotN/odom` where they are asked for; and the [`Truth`] on
-//! `/truth`.
+//! `/robotN/tag_ranges` and `/tf`, `/robotN/scan` and `/robotN/odom` where they are asked for; and the truth on `/truth`.
 //!
 //! [`draw_map`] creates a single map of a building with an exactly known direction, without a drive.
 //!
@@ -33,7 +32,6 @@ mod shape;
 mod simulation;
 mod stage;
 mod tags;
-mod truth;
 mod wheel_odometry;
 mod world;
 
@@ -48,7 +46,6 @@ pub use shape::{Rectangle, Solid};
 pub use simulation::{Simulation, simulate};
 pub use stage::kind;
 pub use tags::{Tag, TagReading};
-pub use truth::Truth;
 pub use world::SimulationError;
 
 pub use crate::shared::scan_grid::SnapshotMap;

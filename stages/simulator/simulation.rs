@@ -5,9 +5,9 @@ use super::parameters::SimulatorParameters;
 use super::robot::{RobotLog, simulate_robot};
 use super::route::share_rooms;
 use super::tags::Tag;
-use super::truth::Truth;
 use super::world::{SimulationError, World};
 use crate::shared::geometry::{Point2, PointIndex, Pose2};
+use gridweave_runtime::ros::{CommonPlace, Header, SimulationTruth, TrueFrame, TrueTag};
 use gridweave_runtime::stage::Parameters as _;
 use rayon::prelude::*;
 
@@ -24,8 +24,8 @@ pub struct Simulation {
     pub tags: Vec<Tag>,
     /// Log of each robot.
     pub robots: Vec<RobotLog>,
-    /// Truth for the evaluation of a merge.
-    pub truth: Truth,
+    /// Truth for the evaluation of a merge, without a time.
+    pub truth: SimulationTruth,
 }
 
 /// Creates a building, simulates the robots in it, and computes the truth. The same parameters and seed give the same
@@ -50,22 +50,28 @@ pub fn simulate(parameters: &SimulatorParameters, seed: u64) -> Result<Simulatio
     Ok(Simulation { plan: world.plan, tags: world.tags, robots, truth })
 }
 
-fn truth_of(tags: &[Tag], robots: &[RobotLog]) -> Truth {
+fn truth_of(tags: &[Tag], robots: &[RobotLog]) -> SimulationTruth {
     let transform_building_first = robots.first().map(|robot| robot.transform_building_map).unwrap_or_default();
-    let frame = |robot: &RobotLog| transform_building_first.inv_mul(&robot.transform_building_map);
-    let last_map = |robot: &RobotLog| Some((robot.name.clone(), robot.maps.last()?.1.geometry));
-    let centres = robots.iter().filter_map(last_map).map(|(name, geometry)| {
-        let size = Point2::new(geometry.width as f64, geometry.height as f64);
-        (name, geometry.origin * (size * geometry.resolution / 2.0))
-    });
-    Truth {
-        resolution: robots.first().and_then(last_map).map_or(0.0, |(_, geometry)| geometry.resolution),
-        frames: robots.iter().map(|robot| (robot.name.clone(), frame(robot))).collect(),
-        tags: tags
-            .iter()
-            .map(|tag| (tag.id.clone(), transform_building_first.inverse_transform_point(&tag.place)))
-            .collect(),
-        centres: centres.collect(),
+    let last_map = |robot: &RobotLog| Some(robot.maps.last()?.1.geometry);
+    let frame = |robot: &RobotLog| {
+        let pose = transform_building_first.inv_mul(&robot.transform_building_map);
+        let centre = last_map(robot).map_or(Point2::origin(), |geometry| {
+            let size = Point2::new(geometry.width as f64, geometry.height as f64);
+            geometry.origin * (size * geometry.resolution / 2.0)
+        });
+        let (x, y) = (pose.translation.x, pose.translation.y);
+        TrueFrame { robot: robot.name.clone(), x, y, yaw: pose.rotation.angle(), centre: centre.coords.into() }
+    };
+    let tag = |tag: &Tag| {
+        let place = transform_building_first.inverse_transform_point(&tag.place);
+        TrueTag { tag_id: tag.id.clone(), x: place.x, y: place.y }
+    };
+    let first = robots.first();
+    SimulationTruth {
+        header: Header { frame_id: format!("{}/map", first.map_or("", |robot| &robot.name)), ..Default::default() },
+        resolution: first.and_then(last_map).map_or(0.0, |geometry| geometry.resolution),
+        frames: robots.iter().map(frame).collect(),
+        tags: tags.iter().map(tag).collect(),
         common: first_two_by_name(robots).map_or_else(Vec::new, |[first, second]| common_places(first, second)),
     }
 }
@@ -79,7 +85,7 @@ fn first_two_by_name(robots: &[RobotLog]) -> Option<[&RobotLog; 2]> {
 
 /// Points that two robots both have driven through, in the map of the first and in that of the second: a robot's map
 /// is displaced by the error of its pose.
-fn common_places(first: &RobotLog, second: &RobotLog) -> Vec<[Point2; 2]> {
+fn common_places(first: &RobotLog, second: &RobotLog) -> Vec<CommonPlace> {
     let place = |pose: &Pose2| Point2::from(pose.translation.vector);
     let driven: Vec<Point2> = first.true_poses.iter().map(place).collect();
     let (index, order) = PointIndex::new(&driven, COMMON_SPACING);
@@ -92,7 +98,8 @@ fn common_places(first: &RobotLog, second: &RobotLog) -> Vec<[Point2; 2]> {
         }
         let Some(near) = index.nearest(&at, COMMON_SPACING) else { continue };
         let tick = order[near.index];
-        common.push([first.poses[tick] * first.true_poses[tick].inverse_transform_point(&at), place(pose)]);
+        let in_first = first.poses[tick] * first.true_poses[tick].inverse_transform_point(&at);
+        common.push(CommonPlace { first: in_first.coords.into(), second: place(pose).coords.into() });
         last = Some(at);
     }
     common
@@ -101,7 +108,7 @@ fn common_places(first: &RobotLog, second: &RobotLog) -> Vec<[Point2; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shared::geometry::{Cell, Grid, is_occupied};
+    use crate::shared::geometry::{Cell, Grid, is_occupied, pose};
     use gridweave_runtime::stage::ParameterError;
 
     /// A small building with two robots, exact poses and an exact lidar.
@@ -117,6 +124,10 @@ mod tests {
             tags: 12,
             ..SimulatorParameters::default()
         }
+    }
+
+    fn transform(frame: &TrueFrame) -> Pose2 {
+        pose(frame.x, frame.y, frame.yaw)
     }
 
     fn last_grid(robot: &RobotLog) -> Grid<'_> {
@@ -141,7 +152,7 @@ mod tests {
         for seed in 0..4 {
             let simulation = simulate(&small(), seed).unwrap();
             let [first, second] = [&simulation.robots[0], &simulation.robots[1]].map(last_grid);
-            let transform_first_second = simulation.truth.frames[1].1;
+            let transform_first_second = transform(&simulation.truth.frames[1]);
             let (mut on_first, mut near_wall) = (0, 0);
             for cell in second.occupied() {
                 let point = transform_first_second * second.geometry.centre(cell);
@@ -165,7 +176,10 @@ mod tests {
         let apart = |drift: f64| {
             let truth = simulate(&SimulatorParameters { drift, ..small() }, 3).unwrap().truth;
             assert!(truth.common.len() > 10, "{}", truth.common.len());
-            let distance = |[first, second]: &[Point2; 2]| (first - truth.frames[1].1 * second).norm();
+            let transform_first_second = transform(&truth.frames[1]);
+            let distance = |CommonPlace { first, second }: &CommonPlace| {
+                (Point2::from(*first) - transform_first_second * Point2::from(*second)).norm()
+            };
             truth.common.iter().map(distance).fold(0.0, f64::max)
         };
         assert!(apart(0.0) < 1e-9);
@@ -188,19 +202,19 @@ mod tests {
     fn the_truth_contains_tags_frames_and_centres() {
         let simulation = simulate(&small(), 2).unwrap();
         let truth = &simulation.truth;
-        assert_eq!(truth.frames[0].1, Pose2::identity());
-        for (robot, (name, transform_first_robot)) in simulation.robots.iter().zip(&truth.frames) {
-            assert_eq!(&robot.name, name);
+        assert_eq!(transform(&truth.frames[0]), Pose2::identity());
+        for (robot, frame) in simulation.robots.iter().zip(&truth.frames) {
+            assert_eq!(robot.name, frame.robot);
             let offs = robot.readings.iter().map(|(tick, reading)| {
-                let antenna = transform_first_robot * Point2::from(robot.poses[*tick].translation.vector);
-                (reading.range - (truth.tags[reading.tag].1 - antenna).norm()).abs()
+                let antenna = transform(frame) * Point2::from(robot.poses[*tick].translation.vector);
+                let tag = &truth.tags[reading.tag];
+                (reading.range - (Point2::new(tag.x, tag.y) - antenna).norm()).abs()
             });
             let offs: Vec<f64> = offs.collect();
             assert!(offs.len() > 100 && offs.iter().all(|off| *off < 5.5 * 0.05));
-        }
-        for (robot, (_, centre)) in simulation.robots.iter().zip(&truth.centres) {
             let grid = last_grid(robot);
             let middle = Cell { column: grid.geometry.width / 2, row: grid.geometry.height / 2 };
+            let centre = Point2::from(frame.centre);
             assert!((grid.geometry.centre(middle) - centre).norm() < grid.geometry.resolution);
         }
     }

@@ -100,7 +100,9 @@ impl Source for Simulator {
             none => {
                 let playback = none.insert(Playback::new(&self.parameters, self.seed)?);
                 output.set_log_time(START);
-                output.truth.send("", &playback.simulation.truth.message(START))?;
+                let truth = &mut playback.simulation.truth;
+                truth.header.stamp = START.into();
+                output.truth.send("", truth)?;
                 playback
             }
         };
