@@ -6,7 +6,6 @@
 
 use crate::support::{Ended, LogBuilder, SMALL_BUILDING, TestMap, gridweave, gridweave_program, start_program};
 use gridweave_logs::map_file::{self, GridMap};
-use gridweave_logs::reader::LogFile;
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
@@ -44,22 +43,6 @@ fn fail_at_each_block(folder: &Path, args: &[&str], outputs: &[&str], most: usiz
         }
     }
     panic!("{most} blocks are not enough");
-}
-
-#[test]
-fn a_log_whose_writing_fails_at_any_block_leaves_the_earlier_one() {
-    let folder = TempDir::new().unwrap();
-    let input = folder.path().join("input.mcap");
-    let mut log = LogBuilder::new(&input);
-    for number in 0..3 {
-        // Bytes that do not compress.
-        let bytes: Vec<u8> =
-            (0..1500_u64).map(|at| ((at + 7919 * number).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 56) as u8).collect();
-        log.raw(number as f64, "/other", "std_msgs/msg/String", &bytes);
-    }
-    log.finish();
-    fail_at_each_block(folder.path(), &["convert", "input.mcap", "-o", "output.mcap"], &["output.mcap"], 60);
-    assert!(LogFile::open(folder.path().join("output.mcap")).unwrap().damage().is_empty());
 }
 
 #[test]

@@ -112,7 +112,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn rays(count: usize) -> impl Iterator<Item = Ray> {
+    fn rays(count: usize) -> impl Iterator<Item = Ray> + Clone {
         (0..count).map(|index| {
             let step = index as f64;
             let origin = Point2::new(0.1 * step, (0.7 * step).sin());
@@ -140,23 +140,12 @@ mod tests {
     #[test]
     fn many_rays_that_miss_do_not_underflow_and_an_invalid_point_is_none() {
         for outlier_share in [0.0, 1e-300, 0.02] {
-            let product = RayProduct::new(rays(20).cycle_to(2000), outlier_share);
+            let product = RayProduct::new(rays(20).cycle().take(2000), outlier_share);
             for place in [Point2::origin(), Point2::new(-3.0, -3.0), Point2::new(0.1, 0.7f64.sin())] {
                 let value = product.log_likelihood_within(&place, 0.0, f64::NEG_INFINITY).unwrap();
                 assert!(value.is_finite() && value < -100.0, "{value}");
                 assert!(product.information(&place).iter().all(|value| value.is_finite()));
             }
-        }
-    }
-
-    trait CycleTo {
-        fn cycle_to(self, count: usize) -> std::vec::IntoIter<Ray>;
-    }
-
-    impl<I: Iterator<Item = Ray>> CycleTo for I {
-        fn cycle_to(self, count: usize) -> std::vec::IntoIter<Ray> {
-            let few: Vec<Ray> = self.collect();
-            few.into_iter().cycle().take(count).collect::<Vec<_>>().into_iter()
         }
     }
 
