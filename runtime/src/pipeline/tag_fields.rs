@@ -4,107 +4,99 @@ use super::diagnostic::{Diagnostic, Location, Problems};
 use super::document::{Entry, Item};
 use super::values::{entries, text, unknown_key, wrong_type};
 use crate::stage::{PathLoss, TagFields};
+use std::collections::BTreeMap;
 
-const KEYS: [&str; 16] = [
-    "topic",
-    "each",
-    "id_field",
-    "range_field",
-    "range_unit",
-    "rssi_field",
-    "rssi_at_1m",
-    "path_loss_exponent",
-    "rssi_stddev",
-    "stddev_field",
-    "stddev",
-    "pose_field",
-    "bearing_field",
-    "bearing_unit",
-    "bearing_stddev_field",
-    "bearing_stddev",
+/// The value that a key takes.
+#[derive(Clone, Copy)]
+enum Expected {
+    /// The topic, which is checked elsewhere.
+    Topic,
+    Text,
+    /// A number in words, and whether a finite one fits.
+    Number(&'static str, fn(f64) -> bool),
+}
+
+const POSITIVE: Expected = Expected::Number("a number above 0", |value| value > 0.0);
+const KEYS: [(&str, Expected); 16] = [
+    ("topic", Expected::Topic),
+    ("each", Expected::Text),
+    ("id_field", Expected::Text),
+    ("range_field", Expected::Text),
+    ("range_unit", POSITIVE),
+    ("rssi_field", Expected::Text),
+    ("rssi_at_1m", Expected::Number("a number, dBm", |_| true)),
+    ("path_loss_exponent", POSITIVE),
+    ("rssi_stddev", POSITIVE),
+    ("stddev_field", Expected::Text),
+    ("stddev", POSITIVE),
+    ("pose_field", Expected::Text),
+    ("bearing_field", Expected::Text),
+    // Below 0 it counts clockwise.
+    ("bearing_unit", Expected::Number("a number other than 0", |value| value != 0.0)),
+    ("bearing_stddev_field", Expected::Text),
+    ("bearing_stddev", POSITIVE),
 ];
 const EXAMPLE: &str = "tags = { topic = \"/{robot}/uwb\", id_field = \"anchor_id\", range_field = \"distance\" }";
 
-/// Takes in the table. Gives the entry of the topic, and the fields.
+/// Reads the table. Returns the entry of the topic, and the fields.
 pub(super) fn read_tag_fields<'a>(
     item: &'a Item,
     key_at: &Location,
     problems: &mut Problems,
 ) -> (Option<&'a Item>, TagFields) {
-    let (mut topic, mut fields) = (None, TagFields::default());
-    let (mut rssi_at_1m, mut exponent, mut stddev) = (None, None, None);
+    let (mut topic, mut texts, mut numbers) = (None, BTreeMap::new(), BTreeMap::new());
     for Entry { key, key_at, item } in entries(item, "tags", problems) {
-        let number: &mut Option<f64> = match key.as_str() {
-            "topic" => {
-                topic = Some(item);
-                continue;
+        match KEYS.iter().find(|(known, _)| known == key) {
+            None => problems.push(unknown_key(key, key_at, "tags", &KEYS.map(|(key, _)| key))),
+            Some((_, Expected::Topic)) => topic = Some(item),
+            Some((key, Expected::Text)) => texts.extend(text(key, item, problems).map(|text| (*key, text.to_owned()))),
+            Some((key, Expected::Number(expected, fits))) => {
+                let value = item.as_float().or_else(|| item.as_integer().map(|value| value as f64));
+                match value.filter(|value| value.is_finite() && fits(*value)) {
+                    Some(value) => drop(numbers.insert(*key, value)),
+                    None => problems.push(wrong_type(key, item, expected)),
+                }
             }
-            "id_field" => {
-                fields.id_field = text(key, item, problems).unwrap_or_default().to_owned();
-                continue;
-            }
-            "each"
-            | "range_field"
-            | "rssi_field"
-            | "stddev_field"
-            | "pose_field"
-            | "bearing_field"
-            | "bearing_stddev_field" => {
-                let field = match key.as_str() {
-                    "each" => &mut fields.each,
-                    "range_field" => &mut fields.range_field,
-                    "rssi_field" => &mut fields.rssi_field,
-                    "stddev_field" => &mut fields.stddev_field,
-                    "bearing_field" => &mut fields.bearing_field,
-                    "bearing_stddev_field" => &mut fields.bearing_stddev_field,
-                    _ => &mut fields.pose_field,
-                };
-                *field = text(key, item, problems).map(str::to_owned);
-                continue;
-            }
-            "range_unit" => &mut fields.range_unit,
-            "stddev" => &mut fields.stddev,
-            "bearing_unit" => &mut fields.bearing_unit,
-            "bearing_stddev" => &mut fields.bearing_stddev,
-            "rssi_at_1m" => &mut rssi_at_1m,
-            "path_loss_exponent" => &mut exponent,
-            "rssi_stddev" => &mut stddev,
-            _ => {
-                problems.push(unknown_key(key, key_at, "tags", &KEYS));
-                continue;
-            }
-        };
-        let value = item.as_float().or_else(|| item.as_integer().map(|value| value as f64));
-        let is_good = |value: &f64| match key.as_str() {
-            "rssi_at_1m" => value.is_finite(),
-            // Below 0 it counts clockwise.
-            "bearing_unit" => value.is_finite() && *value != 0.0,
-            _ => value.is_finite() && *value > 0.0,
-        };
-        match value.filter(is_good) {
-            Some(value) => *number = Some(value),
-            None if key == "rssi_at_1m" => problems.push(wrong_type(key, item, "a number, dBm")),
-            None if key == "bearing_unit" => problems.push(wrong_type(key, item, "a number other than 0")),
-            None => problems.push(wrong_type(key, item, "a number above 0")),
         }
     }
-    fields.path_loss = rssi_at_1m.map(|rssi_at_1m| PathLoss {
-        rssi_at_1m,
-        exponent: exponent.unwrap_or(2.0),
-        stddev: stddev.unwrap_or(4.0),
-    });
+    let number = |key: &str| numbers.get(key).copied();
+    let fields = TagFields {
+        each: texts.remove("each"),
+        id_field: texts.remove("id_field").unwrap_or_default(),
+        range_field: texts.remove("range_field"),
+        range_unit: number("range_unit"),
+        rssi_field: texts.remove("rssi_field"),
+        path_loss: number("rssi_at_1m").map(|rssi_at_1m| PathLoss {
+            rssi_at_1m,
+            exponent: number("path_loss_exponent").unwrap_or(2.0),
+            stddev: number("rssi_stddev").unwrap_or(4.0),
+        }),
+        stddev_field: texts.remove("stddev_field"),
+        stddev: number("stddev"),
+        pose_field: texts.remove("pose_field"),
+        bearing_field: texts.remove("bearing_field"),
+        bearing_unit: number("bearing_unit"),
+        bearing_stddev_field: texts.remove("bearing_stddev_field"),
+        bearing_stddev: number("bearing_stddev"),
+    };
+    report_missing(topic.is_some(), &fields, key_at, problems);
+    (topic, fields)
+}
+
+/// Reports what a reading lacks.
+fn report_missing(has_topic: bool, fields: &TagFields, key_at: &Location, problems: &mut Problems) {
     let mut lacks = |what: &str, why: &str| {
         let problem = Diagnostic::new(format!("`tags` has no `{what}`")).at(key_at, why);
         problems.push(problem.help(format!("write as in `{EXAMPLE}`")));
     };
-    if topic.is_none() {
+    if !has_topic {
         lacks("topic", "nothing says on which topic the readings are");
     }
     if fields.id_field.is_empty() {
         lacks("id_field", "nothing says which tag a reading is of");
     }
-    let tells_where = [&fields.range_field, &fields.rssi_field, &fields.pose_field, &fields.bearing_field];
-    if tells_where.iter().all(|field| field.is_none()) {
+    let of_position = [&fields.range_field, &fields.rssi_field, &fields.pose_field, &fields.bearing_field];
+    if of_position.iter().all(|field| field.is_none()) {
         lacks(
             "range_field",
             "a reading needs a range, a signal strength (`rssi_field`), a bearing (`bearing_field`) or a pose (`pose_field`)",
@@ -113,5 +105,4 @@ pub(super) fn read_tag_fields<'a>(
     if fields.rssi_field.is_some() && fields.range_field.is_none() && fields.path_loss.is_none() {
         lacks("rssi_at_1m", "a signal strength says how far a tag is only if that at one metre is known");
     }
-    (topic, fields)
 }
