@@ -22,7 +22,7 @@ pub mod schemas;
 pub mod sink;
 pub mod source;
 pub mod summary;
-mod temporary;
+pub mod temporary;
 pub mod tf;
 pub mod truth;
 mod yaml;

@@ -1,4 +1,4 @@
-//! Temporary files, in the folder that `TMPDIR` names.
+//! Temporary files and folders, in the folder that `TMPDIR` names.
 
 use rustix::fs::{AtFlags, CWD, linkat};
 use std::fs::{self, File};
@@ -16,6 +16,16 @@ pub(crate) fn file() -> io::Result<File> {
     tempfile::tempfile().map_err(|error| in_words(&error))
 }
 
+/// Creates a folder that only this user can read, removed on drop.
+///
+/// # Errors
+/// It cannot be created, such as in a folder that does not exist.
+pub fn folder() -> io::Result<TempDir> {
+    let private = fs::Permissions::from_mode(0o700);
+    let made = tempfile::Builder::new().prefix("gridweave-").permissions(private).tempdir();
+    made.map_err(|error| in_words(&error))
+}
+
 /// A name for a file without one, for libraries that need it. It is removed on drop; programs that have it open can
 /// still read it.
 pub(crate) struct Name {
@@ -27,9 +37,7 @@ impl Name {
     /// Gives a name to a temporary file that was opened here. On file systems without names for such files, it is
     /// copied.
     pub(crate) fn of(file: &File) -> io::Result<Self> {
-        let private = fs::Permissions::from_mode(0o700);
-        let made = tempfile::Builder::new().prefix("gridweave-").permissions(private).tempdir();
-        let folder = made.map_err(|error| in_words(&error))?;
+        let folder = folder()?;
         let path = folder.path().join("file");
         let open = format!("/proc/self/fd/{}", file.as_raw_fd());
         if linkat(CWD, &open, CWD, &path, AtFlags::SYMLINK_FOLLOW).is_err() {
@@ -73,6 +81,11 @@ mod tests {
         let mut text = String::new();
         again.read_to_string(&mut text).unwrap();
         assert_eq!(text, "contents");
+    }
+
+    #[test]
+    fn a_folder_is_private() {
+        assert_eq!(folder().unwrap().path().metadata().unwrap().permissions().mode() & 0o777, 0o700);
     }
 
     #[test]

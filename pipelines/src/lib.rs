@@ -26,7 +26,6 @@ pub mod shipped;
 mod status;
 pub mod summary;
 pub mod table;
-mod temporary;
 mod terminal;
 mod text_wrapping;
 mod trace;

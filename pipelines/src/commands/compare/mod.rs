@@ -17,13 +17,13 @@ use crate::job::check_is_no_input;
 use crate::job::progress::Gauge;
 use crate::shipped;
 use crate::status::{BadUse, Status};
-use crate::temporary;
 use crate::terminal::{print, print_line, width};
 use crate::trace;
 use anyhow::{Context, Result, bail};
 use cases::Case;
 use clap::Args;
 use gridweave_logs::file::{check_writable, replace};
+use gridweave_logs::temporary;
 use gridweave_runtime::pipeline::Mode;
 use gridweave_runtime::stage::Registry;
 use merge_case::{Merge, MergeResult};
@@ -80,7 +80,7 @@ pub(crate) struct CompareArgs {
 /// Runs the pipelines and prints the results.
 pub(crate) fn compare(args: &CompareArgs, registry: &Registry) -> Result<Status> {
     let pipelines = names(&args.pipelines)?;
-    let folder = temporary::folder("the outputs of the runs")?;
+    let folder = temporary::folder().context("cannot make a folder for the outputs of the runs")?;
     let cases = cases::of(&args.inputs, args.unrelated, folder.path(), registry)?;
     let inputs: Vec<&PathBuf> = args.pipelines.iter().chain(cases.iter().flat_map(|case| &case.files)).collect();
     for output in args.csv.iter().chain(trace::file()) {

@@ -4,9 +4,9 @@ use super::case_file::Case;
 use super::recording::Recording;
 use super::routes::{InputStream, input_streams};
 use super::{sink, source};
-use crate::temporary;
 use anyhow::{Context, Result, bail};
 use gridweave_logs::reader::LogFile;
+use gridweave_logs::temporary;
 use gridweave_runtime::engine::{self, EngineKind, Observer};
 use gridweave_runtime::pipeline::{
     DEFAULT_DEPTH, DEFAULT_SAME_TIME_LIMIT, Mode, Overflow, Pipeline, Restart, StageSpec, Wire,
@@ -36,7 +36,7 @@ pub(super) fn run_case(case: &Case, observer: &dyn Observer) -> Result<Recording
     if !has_input && (!case.inputs.is_empty() || reads_file) {
         bail!("there is no {}", case.input.display());
     }
-    let folder = temporary::folder("the output of a case")?;
+    let folder = temporary::folder().context("cannot make a folder for the output of a case")?;
     let output = folder.path().join("output.mcap");
     let files = [(INPUT, text_of(&case.input)?), (OUTPUT, text_of(&output)?), (CASE, text_of(&case.folder)?)];
     let mut recording = run_stage(case, &files, observer)?;
