@@ -1,10 +1,11 @@
 //! What an experiment takes out of the logs that merges have written.
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use gridweave_logs::map_file::GridMap;
 use gridweave_logs::reader;
 use gridweave_logs::schemas::full_type_name;
 use gridweave_runtime::ros::{OccupancyGrid, RosMessage, decode};
+use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -25,8 +26,21 @@ pub(crate) fn last_maps(log: &Path) -> Result<BTreeMap<String, GridMap>> {
     Ok(decoded.collect())
 }
 
-/// Hands out every message of one ROS 2 type in a log by log time: its topic and its bytes.
-pub(crate) fn read_messages(log: &Path, ros_type: &str, mut each: impl FnMut(&str, &[u8])) -> Result<()> {
+/// Passes every message of a type in a log to `each`, by log time.
+pub(crate) fn read_decoded<T: RosMessage + DeserializeOwned>(log: &Path, mut each: impl FnMut(T)) -> Result<()> {
+    let mut broken = None;
+    read_messages(log, T::NAME, |_, data| match decode(data) {
+        Ok(message) => each(message),
+        Err(error) => broken = Some(error),
+    })?;
+    match broken {
+        Some(error) => Err(error).with_context(|| format!("cannot read the messages {} of {}", T::NAME, log.display())),
+        None => Ok(()),
+    }
+}
+
+/// Passes the topic and the bytes of every message of a ROS 2 type in a log to `each`, by log time.
+fn read_messages(log: &Path, ros_type: &str, mut each: impl FnMut(&str, &[u8])) -> Result<()> {
     let mut reader = reader::open(&[log.to_owned()])?;
     let files = Arc::clone(reader.files());
     // For each channel, its topic if it carries the type.

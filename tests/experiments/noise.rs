@@ -8,12 +8,12 @@
 
 use super::plot::{Axis, Plot, Series, Shape};
 use super::results::Results;
-use super::statistics::{median, quantile, wilson_interval};
+use super::statistics::{NORMALISED_95, median, quantile, wilson_interval};
 use super::trial::World;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use gridweave::common_places::{CommonPlaces, FromBest};
-use gridweave::evaluate::{RIGHT_DEGREES, RIGHT_METRES, RobotOutcome};
+use gridweave::evaluate::{RIGHT_DEGREES, RIGHT_METRES, RobotOutcome, RobotResult};
 use gridweave::table::Table;
 use gridweave_runtime::stage::Registry;
 use rayon::prelude::*;
@@ -122,19 +122,10 @@ impl Sweep {
 /// What became of one world.
 struct Trial {
     seed: u64,
-    outcome: RobotOutcome,
-    error_m: Option<f64>,
-    error_deg: Option<f64>,
-    /// The squared error by the covariance that the merge reports.
-    normalised: Option<f64>,
+    robot: RobotResult,
     /// Distances of places that both robots have driven through.
     common: Option<CommonPlaces>,
-    reason: String,
 }
-
-/// With a correct covariance, 95 % of the squared errors in x, y and yaw are below this (chi-squared with
-/// three degrees of freedom).
-const NORMALISED_95: f64 = 7.815;
 
 /// Does the experiment.
 pub(super) fn run(args: &NoiseArgs, registry: &Registry, results: &mut Results) -> Result<()> {
@@ -186,7 +177,7 @@ fn sweep(sweep: &Sweep, args: &NoiseArgs, registry: &Registry, results: &mut Res
     let mut bands: [Vec<(f64, f64, f64)>; 3] = Default::default();
     for &value in sweep.values {
         let trials = trials(sweep, value, args, registry)?;
-        let counts = OUTCOMES.map(|outcome| trials.iter().filter(|trial| trial.outcome == outcome).count());
+        let counts = OUTCOMES.map(|outcome| trials.iter().filter(|trial| trial.robot.outcome == outcome).count());
         for ((share, band), count) in shares.iter_mut().zip(&mut bands).zip(counts) {
             let (low, high) = wilson_interval(count, trials.len());
             share.push((value, count as f64 / trials.len() as f64));
@@ -216,7 +207,7 @@ fn summary(trials: &[Trial], counts: [usize; 3]) -> Vec<String> {
         format!("{within} of {}", normalised.len())
     };
     let errors = |error: fn(&Trial) -> Option<f64>| trials.iter().filter_map(error).collect::<Vec<f64>>();
-    let (metres, degrees) = (errors(|trial| trial.error_m), errors(|trial| trial.error_deg));
+    let (metres, degrees) = (errors(|trial| trial.robot.error_m), errors(|trial| trial.robot.error_deg));
     let places: Vec<&CommonPlaces> = trials.iter().filter_map(|trial| trial.common.as_ref()).collect();
     let common_parts: [fn(&CommonPlaces) -> f64; 4] = [
         |places| places.rigid.median_m,
@@ -233,7 +224,7 @@ fn summary(trials: &[Trial], counts: [usize; 3]) -> Vec<String> {
     let mut cells = counts.map(|count| count.to_string()).to_vec();
     cells.push(format!("{:.0} % to {:.0} %", 100.0 * low, 100.0 * high));
     cells.extend([median(&metres), quantile(&metres, 0.95), median(&degrees), quantile(&degrees, 0.95)].map(number));
-    cells.push(within(&errors(|trial| trial.normalised)));
+    cells.push(within(&errors(|trial| trial.robot.normalised_error_squared)));
     cells.extend(common.map(number));
     cells.push(best.iter().filter(is_wrong).count().to_string());
     cells.extend([median(&turned), quantile(&turned, 0.95)].map(number));
@@ -251,15 +242,15 @@ impl Trial {
         [
             value.to_string(),
             self.seed.to_string(),
-            self.outcome.words().to_owned(),
-            number(self.error_m),
-            number(self.error_deg),
-            number(self.normalised),
+            self.robot.outcome.words().to_owned(),
+            number(self.robot.error_m),
+            number(self.robot.error_deg),
+            number(self.robot.normalised_error_squared),
             number(from_best.map(|best| best.metres)),
             number(from_best.map(|best| best.degrees)),
             number(rigid.map(|rigid| rigid.median_m)),
             number(rigid.map(|rigid| rigid.p90_m)),
-            self.reason,
+            self.robot.reason.unwrap_or_default(),
         ]
     }
 }
@@ -281,15 +272,7 @@ fn trials(sweep: &Sweep, value: f64, args: &NoiseArgs, registry: &Registry) -> R
         let world = World::simulate(&world_settings, seed, registry)?;
         let merge = world.merge(&args.pipeline, &merge_settings, registry)?;
         let common = merge.evaluation.common;
-        Ok(merge.evaluation.robots.into_iter().map(move |robot| Trial {
-            seed,
-            outcome: robot.outcome,
-            error_m: robot.error_m,
-            error_deg: robot.error_deg,
-            normalised: robot.normalised_error_squared,
-            common,
-            reason: robot.reason.unwrap_or_default(),
-        }))
+        Ok(merge.evaluation.robots.into_iter().map(move |robot| Trial { seed, robot, common }))
     };
     let trials: Result<Vec<_>> = seeds.par_iter().map(one).collect();
     Ok(trials?.into_iter().flatten().collect())

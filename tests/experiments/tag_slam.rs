@@ -6,11 +6,11 @@
 //! pose can be known no better than the drift allows.
 
 use super::results::Results;
-use super::statistics::{median, quantile};
+use super::statistics::{NORMALISED_95, median, quantile};
 use super::trial::World;
 use anyhow::{Context, Result};
 use clap::Args;
-use gridweave::evaluate::RobotOutcome;
+use gridweave::evaluate::{RobotOutcome, RobotResult};
 use gridweave::table::Table;
 use gridweave_runtime::stage::Registry;
 use gridweave_tests::{LogBuilder, Sense, TagDrive};
@@ -31,9 +31,6 @@ pub(super) struct TagSlamArgs {
 
 /// Drifts of the heading after a metre, radians.
 const DRIFTS: [f64; 5] = [0.0, 0.003, 0.01, 0.03, 0.1];
-/// With a correct covariance, 95 % of the squared errors in x, y and yaw are below this (chi-squared with three degrees
-/// of freedom).
-const NORMALISED_95: f64 = 7.815;
 
 /// A place with tags, and how they are read.
 struct Place {
@@ -75,14 +72,6 @@ fn places() -> [Place; 3] {
     ]
 }
 
-/// What became of a pair of drives.
-struct Trial {
-    outcome: RobotOutcome,
-    error_m: Option<f64>,
-    error_deg: Option<f64>,
-    normalised: Option<f64>,
-}
-
 /// Does the experiment.
 pub(super) fn run(args: &TagSlamArgs, registry: &Registry, results: &mut Results) -> Result<()> {
     let heads = [
@@ -102,11 +91,11 @@ pub(super) fn run(args: &TagSlamArgs, registry: &Registry, results: &mut Results
         for drift in DRIFTS {
             let seeds: Vec<u64> = (args.first_seed..args.first_seed.saturating_add(args.seeds)).collect();
             let trials = seeds.par_iter().map(|&seed| trial(&place, drift, seed, registry));
-            let trials: Vec<Trial> = trials.collect::<Result<_>>()?;
+            let trials: Vec<RobotResult> = trials.collect::<Result<_>>()?;
             let count = |outcome| trials.iter().filter(|trial| trial.outcome == outcome).count().to_string();
-            let known = |value: fn(&Trial) -> Option<f64>| trials.iter().filter_map(value).collect::<Vec<f64>>();
+            let known = |value: fn(&RobotResult) -> Option<f64>| trials.iter().filter_map(value).collect::<Vec<f64>>();
             let (metres, degrees) = (known(|trial| trial.error_m), known(|trial| trial.error_deg));
-            let normalised = known(|trial| trial.normalised);
+            let normalised = known(|trial| trial.normalised_error_squared);
             let within = normalised.iter().filter(|squared| **squared < NORMALISED_95).count();
             let number = |value: f64| if value.is_finite() { format!("{value:.3}") } else { "-".to_owned() };
             table.row([
@@ -126,8 +115,8 @@ pub(super) fn run(args: &TagSlamArgs, registry: &Registry, results: &mut Results
     results.table("tag_slam", "## Tags and odometry that drifts, without maps", &table)
 }
 
-/// Writes two drives that begin at opposite corners, and merges them.
-fn trial(place: &Place, drift: f64, seed: u64, registry: &Registry) -> Result<Trial> {
+/// Writes two drives that begin at opposite corners, and merges them. Returns what became of the second robot.
+fn trial(place: &Place, drift: f64, seed: u64, registry: &Registry) -> Result<RobotResult> {
     let folder = TempDir::new().context("cannot make a folder for a log")?;
     let [width, height] = place.size;
     let corner = |x: f64, y: f64| Point2::new(x * width, y * height);
@@ -151,11 +140,5 @@ fn trial(place: &Place, drift: f64, seed: u64, registry: &Registry) -> Result<Tr
     let frames = serde_json::json!({ "frames": { "robot1": of(starts[0]), "robot2": of(starts[1]) } });
     std::fs::write(&truth, frames.to_string()).with_context(|| format!("cannot write {}", truth.display()))?;
     let merge = World::recorded(&path, &truth)?.merge("tag_frames", &[], registry)?;
-    let robot = merge.evaluation.robots.first().context("the evaluation lacks robot2")?;
-    Ok(Trial {
-        outcome: robot.outcome,
-        error_m: robot.error_m,
-        error_deg: robot.error_deg,
-        normalised: robot.normalised_error_squared,
-    })
+    merge.evaluation.robots.into_iter().next().context("the evaluation lacks robot2")
 }

@@ -1,11 +1,11 @@
 //! One log, merged by any pipeline and compared with the truth.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use gridweave::evaluate::{Evaluation, evaluate_summary};
 use gridweave::shipped;
 use gridweave_logs::summary::{self, Summary};
 use gridweave_logs::truth;
-use gridweave_runtime::engine::{self, EngineKind, RunReport};
+use gridweave_runtime::engine::{self, EngineKind};
 use gridweave_runtime::pipeline::Overrides;
 use gridweave_runtime::stage::{Registry, StageKind};
 use std::path::{Path, PathBuf};
@@ -30,8 +30,6 @@ pub(super) struct Merge {
     pub(super) summary: Summary,
     /// How far that is from the truth.
     pub(super) evaluation: Evaluation,
-    /// What each stage has done.
-    pub(super) report: RunReport,
 }
 
 impl World {
@@ -59,6 +57,25 @@ impl World {
         Ok(Self { log: log.to_owned(), truth, folder })
     }
 
+    /// The recorded logs of a folder, by name: `NAME.mcap`, each with its `NAME.truth.json`. A log without one counts as
+    /// one of robots that have nothing to do with each other.
+    pub(super) fn recorded_in(folder: &Path) -> Result<Vec<(String, Self)>> {
+        let mut logs = files(folder)?;
+        logs.retain(|path| path.extension().is_some_and(|extension| extension == "mcap"));
+        if logs.is_empty() {
+            bail!(
+                "{} holds no logs: NAME.mcap, and NAME.truth.json where the robots belong together",
+                folder.display()
+            );
+        }
+        let world = |log: &PathBuf| {
+            let name = log.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let truth = log.with_extension("truth.json");
+            Ok((name, if truth.exists() { Self::recorded(log, &truth) } else { Self::unrelated(log) }?))
+        };
+        logs.iter().map(world).collect()
+    }
+
     /// What the last merge has written, but the input's messages.
     pub(super) fn output(&self) -> PathBuf {
         self.folder.path().join("merged.mcap")
@@ -67,11 +84,11 @@ impl World {
     /// Merges the world's log by a shipped pipeline, in one thread. `settings` are `STAGE.PARAMETER=VALUE`.
     pub(super) fn merge(&self, pipeline: &str, settings: &[String], registry: &Registry) -> Result<Merge> {
         let found = self.folder.path().join("summary.json");
-        let report = self.run(pipeline, settings, None, &self.output(), &summary::kind(), &found, registry)?;
+        self.run(pipeline, settings, None, &self.output(), &summary::kind(), &found, registry)?;
         let text = std::fs::read(&found).with_context(|| format!("cannot read {}", found.display()))?;
         let summary: Summary = serde_json::from_slice(&text).context("cannot read the summary of a merge")?;
         let evaluation = evaluate_summary(&summary, &self.truth)?;
-        Ok(Merge { summary, evaluation, report })
+        Ok(Merge { summary, evaluation })
     }
 
     /// Runs a shipped pipeline, with a sink that writes its `result`.
@@ -85,7 +102,7 @@ impl World {
         sink: &StageKind,
         result: &Path,
         registry: &Registry,
-    ) -> Result<RunReport> {
+    ) -> Result<()> {
         let mut overrides = Overrides::default();
         overrides.seed = seed;
         for setting in settings {
@@ -100,6 +117,15 @@ impl World {
         let mut pipeline = shipped::load(Path::new(pipeline), &overrides, registry)?;
         let parameters = toml::Table::from_iter([("file".to_owned(), text(result).into())]);
         pipeline.attach(sink, parameters, "results", |_, _, _| true);
-        Ok(engine::run(&pipeline, EngineKind::Single, &())?)
+        engine::run(&pipeline, EngineKind::Single, &())?;
+        Ok(())
     }
+}
+
+/// The files of a folder, by name.
+pub(super) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>()?;
+    files.sort();
+    Ok(files)
 }

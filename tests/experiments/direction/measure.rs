@@ -7,9 +7,8 @@ use gridweave_stages::tags::line_extractor::extract_segments;
 use gridweave_stages::tags::quadrant_classifier::map_direction;
 use rayon::prelude::*;
 use std::f64::consts::FRAC_PI_2;
-use std::time::Instant;
 
-/// As many maps are made at once, in parallel; then they are searched one by one.
+/// The number of maps that are made at once, in parallel.
 const BATCH: u64 = 32;
 
 /// A kind of map.
@@ -40,8 +39,6 @@ pub(super) struct Run {
     pub(super) valid: bool,
     /// How many walls were found.
     pub(super) segments: usize,
-    /// From the grid to the direction, milliseconds.
-    pub(super) milliseconds: f64,
 }
 
 /// A map and a stage seed for each run: the runs under each set of parameters. All sets see the same maps.
@@ -65,8 +62,7 @@ pub(super) fn over_stage_seeds(case: Case, seeds: u64, settings: &Settings) -> V
     (0..seeds).filter_map(|seed| measure(case, &map, 0, seed, settings)).collect()
 }
 
-/// Maps at several angles, degrees, each with its own seed: the errors at each angle. Runs go side by side, so their
-/// times are not comparable.
+/// Maps at several angles, degrees, each with its own seed: the errors at each angle.
 pub(super) fn over_rotations(walls: WallStyle, degrees: &[f64], maps: u64, settings: &Settings) -> Vec<Vec<f64>> {
     let at = |(index, &degrees): (usize, &f64)| {
         let case = Case { walls, degrees };
@@ -80,10 +76,8 @@ pub(super) fn over_rotations(walls: WallStyle, degrees: &[f64], maps: u64, setti
 /// Measures one run. `None` for a map that is not a grid, which does not happen for drawn maps.
 fn measure(case: Case, map: &SnapshotMap, map_seed: u64, stage_seed: u64, settings: &Settings) -> Option<Run> {
     let grid = Grid::new(map.geometry, &map.cells).ok()?;
-    let start = Instant::now();
     let segments = extract_segments(&grid, &settings.lines, stage_seed);
     let direction = map_direction(&segments, &settings.classifier);
-    let milliseconds = start.elapsed().as_secs_f64() * 1e3;
     let error = turn_difference(direction.angle, case.degrees.to_radians(), FRAC_PI_2).to_degrees();
     Some(Run {
         map_seed,
@@ -92,7 +86,6 @@ fn measure(case: Case, map: &SnapshotMap, map_seed: u64, stage_seed: u64, settin
         deviation: direction.deviation.to_degrees(),
         valid: direction.valid,
         segments: segments.len(),
-        milliseconds,
     })
 }
 
@@ -102,18 +95,13 @@ mod tests {
 
     const SCANNED: Case = Case { walls: WallStyle::Scanned, degrees: -45.0 };
 
-    fn without_times(runs: &[Run]) -> Vec<Run> {
-        runs.iter().map(|run| Run { milliseconds: 0.0, ..*run }).collect()
-    }
-
     #[test]
     fn the_error_is_that_of_the_direction_and_the_same_each_time() {
         let settings = [Settings::shipped()];
         let [first, second] = [(), ()].map(|()| over_maps(SCANNED, 2, &settings).remove(0));
-        assert_eq!(without_times(&first), without_times(&second));
+        assert_eq!(first, second);
         assert!(first.iter().all(|run| run.error.abs() < 0.2 && run.valid && run.segments > 10), "{first:?}");
-        assert_eq!(without_times(&first[..1]), without_times(&over_stage_seeds(SCANNED, 1, &settings[0])));
-        assert!(first.iter().all(|run| run.milliseconds > 0.0));
+        assert_eq!(first[..1], over_stage_seeds(SCANNED, 1, &settings[0]));
     }
 
     #[test]

@@ -17,16 +17,12 @@ fn errors(runs: &[Run]) -> Vec<f64> {
     runs.iter().map(|run| run.error).filter(|error| error.is_finite()).collect()
 }
 
-fn times(runs: &[Run]) -> Vec<f64> {
-    runs.iter().map(|run| run.milliseconds).collect()
-}
-
 /// A number of degrees, or a dash.
 fn degrees(value: f64) -> String {
     if value.is_finite() { format!("{value:.4}") } else { "-".into() }
 }
 
-/// How exact and how fast each style is, under the parameters that ship and under the paper's.
+/// How exact each style is, under the parameters that ship and under the paper's.
 pub(super) fn accuracy(series: &[Series], results: &mut Results) -> Result<()> {
     let mut table = Table::new([
         "walls",
@@ -38,11 +34,9 @@ pub(super) fn accuracy(series: &[Series], results: &mut Results) -> Result<()> {
         "not valid",
         "one map: mean error, deg",
         "one map: std, deg",
-        "median, ms",
-        "95 %, ms",
     ]);
     for Series { style, settings, maps, stage_seeds } in series.iter().filter(|series| !series.stage_seeds.is_empty()) {
-        let (errors, one_map, times) = (errors(maps), errors(stage_seeds), times(maps));
+        let (errors, one_map) = (errors(maps), errors(stage_seeds));
         let reported: Vec<f64> = maps.iter().map(|run| run.deviation).collect();
         table.row([
             format!("{settings}, {style}"),
@@ -54,12 +48,10 @@ pub(super) fn accuracy(series: &[Series], results: &mut Results) -> Result<()> {
             maps.iter().filter(|run| !run.valid).count().to_string(),
             degrees(mean(&one_map)),
             degrees(standard_deviation(&one_map)),
-            format!("{:.2}", quantile(&times, 0.5)),
-            format!("{:.2}", quantile(&times, 0.95)),
         ]);
     }
     // What section 5.1 says; its mean of the directions is -45.0497 degrees, the true one -45.
-    let paper = ["as printed in the paper", "1", "", "", "", "", "", "-0.0497", "0.5598", "938.67 (mean)", ""];
+    let paper = ["as printed in the paper", "1", "", "", "", "", "", "-0.0497", "0.5598"];
     table.row(paper.map(str::to_owned));
     results.table("direction", "Direction of a map's walls", &table)
 }
@@ -79,15 +71,15 @@ pub(super) fn ablations(series: &[Series], settings: &[Settings], results: &mut 
     results.table("direction_parameters", "Standard deviation by parameters and walls, degrees", &table)
 }
 
-/// How the errors and the times are spread.
+/// How the errors are spread.
 pub(super) fn histograms(series: &[Series], results: &mut Results) -> Result<()> {
     const ERROR: &str = "error of the direction, degrees";
     let (shipped, paper) = (Settings::shipped().name, Settings::paper().name);
-    let of = |settings: &str, values: &dyn Fn(&[Run]) -> Vec<f64>| -> Vec<(&str, Vec<f64>)> {
+    let of = |settings: &str| -> Vec<(&str, Vec<f64>)> {
         let series = series.iter().filter(|series| series.settings == settings);
-        series.map(|series| (series.style, values(&series.maps))).collect()
+        series.map(|series| (series.style, errors(&series.maps))).collect()
     };
-    if let Some((_, scanned)) = of(shipped, &errors).last() {
+    if let Some((_, scanned)) = of(shipped).last() {
         let plot = Plot {
             title: "Errors of the direction, scanned maps".into(),
             x: Axis::new(ERROR),
@@ -96,12 +88,10 @@ pub(super) fn histograms(series: &[Series], results: &mut Results) -> Result<()>
         };
         results.plot("direction_histogram", &plot)?;
     }
-    let plot = outlines("Errors of the direction", ERROR, &of(shipped, &errors));
+    let plot = outlines("Errors of the direction", ERROR, &of(shipped));
     results.plot("direction_histogram_styles", &plot)?;
-    let plot = outlines("Errors of the direction, the paper's parameters", ERROR, &of(paper, &errors));
-    results.plot("direction_histogram_paper", &plot)?;
-    let plot = outlines("Time of a run", "from the grid to the direction, ms", &of(shipped, &times));
-    results.plot("direction_time", &plot)
+    let plot = outlines("Errors of the direction, the paper's parameters", ERROR, &of(paper));
+    results.plot("direction_histogram_paper", &plot)
 }
 
 /// The outlines of histograms over common bins, which leave out the last thousandth at either end.
@@ -132,7 +122,6 @@ pub(super) fn all_runs(series: &[Series], results: &mut Results) -> Result<()> {
         "reported std, deg",
         "valid",
         "segments",
-        "ms",
     ]);
     for series in series {
         for (over, runs) in [("maps", &series.maps), ("stage seeds", &series.stage_seeds)] {
@@ -147,7 +136,6 @@ pub(super) fn all_runs(series: &[Series], results: &mut Results) -> Result<()> {
                     format!("{:.5}", run.deviation),
                     run.valid.to_string(),
                     run.segments.to_string(),
-                    format!("{:.3}", run.milliseconds),
                 ]);
             }
         }
@@ -239,7 +227,6 @@ mod tests {
             deviation: 0.1,
             valid: error.is_finite(),
             segments: 3,
-            milliseconds: 1.0,
         };
         assert_eq!(errors(&[run(0.5), run(f64::NAN)]), [0.5]);
         assert_eq!(degrees(f64::NAN), "-");

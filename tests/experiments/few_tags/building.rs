@@ -4,7 +4,7 @@ use super::known::Known;
 use super::outcome::PairOutcome;
 use crate::cut::{self, Member};
 use crate::trial::World;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use gridweave_runtime::stage::Registry;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -40,23 +40,8 @@ impl Building {
 
     /// The recorded logs of a folder.
     pub(super) fn recorded(folder: &Path, registry: &Registry) -> Result<Vec<Self>> {
-        let entries = std::fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
-        let mut logs: Vec<_> = entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>()?;
-        logs.retain(|path| path.extension().is_some_and(|extension| extension == "mcap"));
-        logs.sort();
-        if logs.is_empty() {
-            bail!(
-                "{} holds no logs: NAME.mcap, and NAME.truth.json where the robots belong together",
-                folder.display()
-            );
-        }
-        let building = |log: &std::path::PathBuf| {
-            let name = log.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            let truth = log.with_extension("truth.json");
-            let world = if truth.exists() { World::recorded(log, &truth) } else { World::unrelated(log) };
-            Self::new(name, world?, registry)
-        };
-        logs.par_iter().map(building).collect()
+        let worlds = World::recorded_in(folder)?.into_par_iter();
+        worlds.map(|(name, world)| Self::new(name, world, registry)).collect()
     }
 
     /// One of its robots, if it has it.

@@ -1,9 +1,9 @@
 //! What a merge has found out about each robot by itself: its tags, and the direction of its walls.
 
-use crate::log::read_messages;
+use crate::log::read_decoded;
 use crate::trial::World;
-use anyhow::{Context, Result};
-use gridweave_runtime::ros::{MapDirection, RosMessage, TagEstimates, decode};
+use anyhow::Result;
+use gridweave_runtime::ros::{MapDirection, TagEstimates};
 use nalgebra::Point2;
 use std::collections::BTreeMap;
 
@@ -21,25 +21,15 @@ impl Known {
     pub(super) fn of(world: &World) -> Result<BTreeMap<String, Self>> {
         let log = world.output();
         let mut robots: BTreeMap<String, Self> = BTreeMap::new();
-        let mut broken = None;
-        read_messages(&log, TagEstimates::NAME, |_, data| match decode::<TagEstimates>(data) {
-            Ok(estimates) => {
-                let tags = estimates.tags.into_iter();
-                let tags = tags.map(|tag| (tag.tag_id, (Point2::new(tag.x, tag.y), tag.certainty))).collect();
-                robots.entry(estimates.robot).or_default().tags = tags;
-            }
-            Err(error) => broken = Some(error),
+        read_decoded(&log, |estimates: TagEstimates| {
+            let tags = estimates.tags.into_iter();
+            let tags = tags.map(|tag| (tag.tag_id, (Point2::new(tag.x, tag.y), tag.certainty))).collect();
+            robots.entry(estimates.robot).or_default().tags = tags;
         })?;
-        read_messages(&log, MapDirection::NAME, |_, data| match decode::<MapDirection>(data) {
-            Ok(found) => {
-                robots.entry(found.robot).or_default().direction = found.valid.then_some(found.direction);
-            }
-            Err(error) => broken = Some(error),
+        read_decoded(&log, |found: MapDirection| {
+            robots.entry(found.robot).or_default().direction = found.valid.then_some(found.direction);
         })?;
-        match broken {
-            Some(error) => Err(error).with_context(|| format!("cannot read what {} holds", log.display())),
-            None => Ok(robots),
-        }
+        Ok(robots)
     }
 
     /// The tags of at least some certainty.

@@ -1,12 +1,12 @@
 //! What becomes of a pair of robots.
 
-use crate::log::read_messages;
+use crate::log::read_decoded;
 use crate::trial::World;
 use anyhow::{Context, Result};
 use gridweave::evaluate::{RobotOutcome, evaluate_summary};
 use gridweave::table::Table;
 use gridweave_logs::summary::{Pair, Summary};
-use gridweave_runtime::ros::{RobotFrames, RosMessage, decode};
+use gridweave_runtime::ros::RobotFrames;
 use gridweave_runtime::stage::Registry;
 
 /// The pipeline under test.
@@ -57,15 +57,8 @@ impl PairOutcome {
 
 /// Whether any of the frames that the last merge of a world has sent was wrong.
 fn ever_wrong(world: &World) -> Result<bool> {
-    let mut frames = Vec::new();
-    let mut broken = None;
-    read_messages(&world.output(), RobotFrames::NAME, |_, data| match decode::<RobotFrames>(data) {
-        Ok(found) => frames.push(found),
-        Err(error) => broken = Some(error),
-    })?;
-    if let Some(error) = broken {
-        return Err(error).context("cannot read the frames of a merge");
-    }
+    let mut frames: Vec<RobotFrames> = Vec::new();
+    read_decoded(&world.output(), |found| frames.push(found))?;
     for found in frames.iter().filter(|found| found.frames.len() > 1) {
         let mut summary = Summary::default();
         summary.set_frames(found);
@@ -149,10 +142,8 @@ pub(super) fn all_trials() -> Table {
 /// Adds a trial.
 pub(super) fn add_trial(table: &mut Table, set: &str, trial: &str, needed: usize, pair: &PairOutcome) {
     let outcome = match pair.outcome {
-        RobotOutcome::Right => "right",
-        RobotOutcome::Wrong => "wrong",
-        RobotOutcome::Refused | RobotOutcome::RightlyRefused => "refused",
-        RobotOutcome::NoTruth => "no truth",
+        RobotOutcome::RightlyRefused => RobotOutcome::Refused,
+        outcome => outcome,
     };
     let error =
         |which: fn((f64, f64)) -> f64| pair.errors.map_or_else(String::new, |both| format!("{:.4}", which(both)));
@@ -160,7 +151,7 @@ pub(super) fn add_trial(table: &mut Table, set: &str, trial: &str, needed: usize
         set.to_owned(),
         trial.to_owned(),
         needed.to_string(),
-        outcome.to_owned(),
+        outcome.words().to_owned(),
         pair.ever_wrong.to_string(),
         pair.is_provisional.to_string(),
         error(|both| both.0),

@@ -11,7 +11,6 @@ mod pose_errors;
 mod reading_counts;
 mod reflections;
 mod score;
-mod time;
 mod trial;
 
 use super::results::Results;
@@ -32,7 +31,6 @@ pub(super) fn run(args: &LocalizationArgs, results: &mut Results) -> Result<()> 
     calibration::run(args.seeds, results)?;
     reflections::run(args.seeds, results)?;
     pose_errors::run(args.seeds, results)?;
-    time::run(results)?;
     picture::run(results)
 }
 
@@ -55,7 +53,6 @@ mod tests {
             "localization_reflections.svg",
             "localization_poses.csv",
             "localization_poses.svg",
-            "localization_time.csv",
             "localization_grids.png",
         ] {
             assert!(folder.path().join(name).metadata().unwrap().len() > 100, "{name}");

@@ -4,6 +4,7 @@ use super::kinds::Kind;
 use super::worlds::{self, PairWorld, Seeds};
 use crate::log::last_maps;
 use crate::map_pairs::truth::Closeness;
+use crate::trial::files;
 use anyhow::{Context, Result};
 use gridweave_logs::map_file::{GridMap, Thresholds, load_as};
 use gridweave_runtime::ros::Time;
@@ -114,14 +115,6 @@ fn of_collection(folder: &Path, index: &Path) -> Result<Vec<MapOfBuilding>> {
         Ok(MapOfBuilding { building: place, doubt, ..map })
     };
     indexed.into_iter().map(map).collect()
-}
-
-/// The files of a folder, by name.
-pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
-    let mut files: Vec<PathBuf> = entries.map(|entry| entry.map(|entry| entry.path())).collect::<Result<_, _>>()?;
-    files.sort();
-    Ok(files)
 }
 
 /// The last map of each robot of a log.

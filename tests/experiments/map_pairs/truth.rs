@@ -1,7 +1,8 @@
 //! Which places of two maps are the same.
 
-use super::library::{MapOfBuilding, files, maps_of_log};
+use super::library::{MapOfBuilding, maps_of_log};
 use crate::statistics::quantile;
+use crate::trial::files;
 use anyhow::{Context, Result};
 use gridweave_stages::shared::geometry::Pose2;
 use nalgebra::Point2;
@@ -36,8 +37,8 @@ pub(crate) struct Pair {
 /// Which places are the same.
 #[derive(Clone, Debug, Deserialize)]
 struct PairTruth {
-    /// In map b and in map a: x and y of each, metres.
-    common: Vec<[f64; 4]>,
+    /// In map b and in map a: x and y of each, metres. The truth of a log has them where its maps are deformed.
+    common: Option<Vec<[f64; 4]>>,
     /// Residuals of the best rigid transform, which the deformation of the maps causes: the median and the 90th
     /// percentile, metres.
     #[serde(default)]
@@ -71,10 +72,8 @@ pub(crate) fn pairs(folder: &Path) -> Result<Vec<Pair>> {
     }
     for log in files(folder)?.into_iter().filter(|file| file.extension().is_some_and(|extension| extension == "mcap")) {
         let truth = log.with_extension("truth.json");
-        let Some(truth) = truth.exists().then(|| read::<TruthOfLog>(&truth)).transpose()?.and_then(TruthOfLog::of_pair)
-        else {
-            continue;
-        };
+        let truth = truth.exists().then(|| read::<PairTruth>(&truth)).transpose()?;
+        let Some(truth) = truth.filter(|truth| truth.common.is_some()) else { continue };
         let mut maps = maps_of_log(&log)?.into_iter();
         if let (Some(a), Some(b)) = (maps.next(), maps.next()) {
             let name = log.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -82,23 +81,6 @@ pub(crate) fn pairs(folder: &Path) -> Result<Vec<Pair>> {
         }
     }
     Ok(pairs)
-}
-
-/// The truth of a log, which has common places where its maps are deformed.
-#[derive(Debug, Deserialize)]
-struct TruthOfLog {
-    common: Option<Vec<[f64; 4]>>,
-    #[serde(default)]
-    rigid_median: f64,
-    #[serde(default)]
-    rigid_p90: f64,
-}
-
-impl TruthOfLog {
-    fn of_pair(self) -> Option<PairTruth> {
-        let Self { common, rigid_median, rigid_p90 } = self;
-        Some(PairTruth { common: common?, rigid_median, rigid_p90 })
-    }
 }
 
 fn read<T: serde::de::DeserializeOwned>(file: &Path) -> Result<T> {
@@ -109,7 +91,7 @@ fn read<T: serde::de::DeserializeOwned>(file: &Path) -> Result<T> {
 impl Pair {
     /// Whether the maps have nothing in common.
     pub(crate) fn is_unrelated(&self) -> bool {
-        self.truth.common.is_empty()
+        self.common().is_empty()
     }
 
     /// Whether `T_a_b` aligns the common places within 0.5 m of each other in the median and nine of ten within 1 m,
@@ -135,6 +117,10 @@ impl Pair {
         let error = |[x_b, y_b, x_a, y_a]: &[f64; 4]| {
             (transform_a_b * Point2::new(*x_b, *y_b) - Point2::new(*x_a, *y_a)).norm()
         };
-        self.truth.common.iter().map(error).collect()
+        self.common().iter().map(error).collect()
+    }
+
+    fn common(&self) -> &[[f64; 4]] {
+        self.truth.common.as_deref().unwrap_or_default()
     }
 }

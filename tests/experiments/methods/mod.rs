@@ -8,8 +8,7 @@
 //! - How far the walls of the two maps lie apart, at the found place and at the true one, says whose error it is: where
 //!   a drifting robot has bent its map, walls do not lie on walls at the true place either.
 //! - The time of **one alignment** is what the paper measures: from the last maps of a pair and the tags that they have
-//!   in common to the transform. The busy time of a whole run is all that its stages did: reading the log, localizing
-//!   the tags, an alignment for each of the many times that a map or a tag changed, fusing and writing.
+//!   in common to the transform.
 
 mod one_alignment;
 mod record;
@@ -19,7 +18,7 @@ mod wall_distance;
 use super::results::Results;
 use super::trial::World;
 use crate::log::last_maps;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use clap::Args;
 use gridweave_logs::map_file::GridMap;
 use gridweave_runtime::stage::{Registry, RobotTopics, match_robot};
@@ -82,13 +81,10 @@ pub(super) fn run(args: &MethodsArgs, registry: &Registry, results: &mut Results
     }
     if let Some(folder) = &args.logs {
         let mut records = Vec::new();
-        let logs = logs_in(folder)?;
-        for log in &logs {
-            let name = log.file_stem().unwrap_or_default().to_string_lossy();
+        let logs = World::recorded_in(folder)?;
+        for (name, world) in &logs {
             eprintln!("log {name}");
-            let truth = log.with_extension("truth.json");
-            let world = if truth.exists() { World::recorded(log, &truth) } else { World::unrelated(log) }?;
-            records.extend(trial.records(&world, &name).with_context(|| format!("in the log {}", log.display()))?);
+            records.extend(trial.records(world, name).with_context(|| format!("in the log {}", world.log.display()))?);
         }
         sets.push(Set { name: "logs", title: counted(logs.len() as u64, "recorded log"), records });
     }
@@ -141,21 +137,4 @@ fn robot_maps(log: &Path) -> Result<BTreeMap<String, GridMap>> {
 
 fn grid(map: &GridMap) -> Result<Grid<'_>> {
     Grid::new(GridGeometry::from(&map.info), &map.cells).context("a map of the log cannot be used")
-}
-
-/// The logs of a folder, by name.
-fn logs_in(folder: &Path) -> Result<Vec<PathBuf>> {
-    let doing = || format!("cannot look for logs in {}", folder.display());
-    let mut logs = Vec::new();
-    for entry in std::fs::read_dir(folder).with_context(doing)? {
-        let path = entry.with_context(doing)?.path();
-        if path.extension().is_some_and(|extension| extension == "mcap") {
-            logs.push(path);
-        }
-    }
-    if logs.is_empty() {
-        bail!("{} holds no log: LOG.mcap is looked for, with its LOG.truth.json", folder.display());
-    }
-    logs.sort();
-    Ok(logs)
 }

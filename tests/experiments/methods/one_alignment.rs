@@ -1,12 +1,12 @@
 //! One alignment of two maps, as a pipeline's stages do it, and how long it takes.
 
-use crate::log::read_messages;
+use crate::log::read_decoded;
 use crate::processor_time::ProcessorTime;
 use crate::statistics::median;
 use anyhow::{Context, Result};
 use gridweave::shipped;
 use gridweave_runtime::pipeline::{Overrides, Pipeline};
-use gridweave_runtime::ros::{CommonTag, CommonTags, RosMessage, decode};
+use gridweave_runtime::ros::{CommonTag, CommonTags};
 use gridweave_runtime::stage::Registry;
 use gridweave_stages::registration::comparison::{MapView, compare};
 use gridweave_stages::registration::icp::{self, IcpParameters, refine};
@@ -144,15 +144,8 @@ fn parameters<P: DeserializeOwned>(pipeline: &Pipeline, kind: &str) -> Result<Op
 /// The last decision of the tag filter on each pair of robots, in a log that a merge has written.
 pub(super) fn last_common_tags(log: &Path) -> Result<BTreeMap<(String, String), CommonTags>> {
     let mut last = BTreeMap::new();
-    let mut broken = None;
-    read_messages(log, CommonTags::NAME, |_, data| match decode::<CommonTags>(data) {
-        Ok(tags) => {
-            last.insert((tags.robot_a.clone(), tags.robot_b.clone()), tags);
-        }
-        Err(error) => broken = Some(error),
+    read_decoded(log, |tags: CommonTags| {
+        last.insert((tags.robot_a.clone(), tags.robot_b.clone()), tags);
     })?;
-    match broken {
-        Some(error) => Err(error).with_context(|| format!("cannot read the common tags in {}", log.display())),
-        None => Ok(last),
-    }
+    Ok(last)
 }

@@ -7,10 +7,6 @@ use gridweave::evaluate::{RobotOutcome, RobotResult};
 use gridweave::table::Table;
 use gridweave_stages::shared::geometry::{Grid, Pose2, pose};
 
-/// The stages whose time is reported, by their names in the pipelines.
-pub(super) const STAGES: [&str; 10] =
-    ["log", "tags", "common_tags", "lines", "quadrants", "icp", "verifier", "frames", "fuser", "output"];
-
 /// One robot, placed or not placed by one method.
 #[derive(Clone, Debug)]
 pub(super) struct Record {
@@ -30,8 +26,6 @@ pub(super) struct Record {
     pub(super) alignment: Option<AlignmentTime>,
     /// How far that alignment places the map from where the whole run does, metres.
     pub(super) apart: Option<f64>,
-    /// The time that each of the [`STAGES`] was busy in the whole run, milliseconds; 0 for one that the method has not.
-    pub(super) busy: [f64; STAGES.len()],
 }
 
 /// Errors of the pose of a robot's map.
@@ -82,10 +76,6 @@ impl Record {
             }
             _ => None,
         };
-        let busy = STAGES.map(|name| {
-            let of_stage = merge.report.stages.iter().filter(|stage| stage.name == name);
-            of_stage.fold(0.0, |sum, stage| sum + stage.busy.as_secs_f64() * 1e3)
-        });
         Self {
             world: world.to_owned(),
             robot: robot.robot.clone(),
@@ -95,19 +85,12 @@ impl Record {
             error,
             alignment: alignment.map(|alignment| alignment.time),
             apart,
-            busy,
         }
-    }
-
-    /// The time that all stages were busy in the whole run, milliseconds.
-    pub(super) fn all_busy(&self) -> f64 {
-        self.busy.iter().sum()
     }
 
     /// The heads of [`row`](Self::row).
     pub(super) fn heads() -> Table {
-        let names = STAGES.map(|stage| format!("run {stage} ms"));
-        let before = [
+        Table::new([
             "set",
             "world",
             "robot",
@@ -124,16 +107,16 @@ impl Record {
             "alignment icp ms",
             "alignment ms",
             "alignment apart m",
-        ];
-        Table::new(before.into_iter().chain(names.iter().map(String::as_str)).chain(["run ms", "reason"]))
+            "reason",
+        ])
     }
 
     /// All of it, as a line of a table.
-    pub(super) fn row(&self, set: &str) -> impl Iterator<Item = String> {
+    pub(super) fn row(&self, set: &str) -> [String; 17] {
         let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
         let error = |part: fn(&PlaceError) -> f64| number(self.error.as_ref().map(part));
         let time = |part: fn(&AlignmentTime) -> f64| number(self.alignment.as_ref().map(part));
-        let before = [
+        [
             set.to_owned(),
             self.world.clone(),
             self.robot.clone(),
@@ -150,9 +133,8 @@ impl Record {
             time(|time| time.icp),
             time(|time| time.total),
             number(self.apart),
-        ];
-        let busy = self.busy.map(|busy| busy.to_string());
-        before.into_iter().chain(busy).chain([self.all_busy().to_string(), self.reason.clone()])
+            self.reason.clone(),
+        ]
     }
 }
 

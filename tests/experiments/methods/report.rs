@@ -1,7 +1,7 @@
 //! The tables and plots of the experiment.
 
 use super::one_alignment::AlignmentTime;
-use super::record::{PlaceError, Record, STAGES};
+use super::record::{PlaceError, Record};
 use super::{METHODS, Set};
 use crate::plot::{Axis, Plot, Series, Shape};
 use crate::results::Results;
@@ -39,11 +39,6 @@ pub(super) fn write(sets: &[Set], results: &mut Results) -> Result<()> {
         "Time of one alignment, ms of one processor: from the last maps of a pair and their common tags to the transform \
          (medians; in brackets the slowest). The last column is how far it places the map from where the whole run does, at most.",
         &alignment_times(sets),
-    )?;
-    results.table(
-        "methods_run",
-        "Time that the stages are busy in a whole run, ms (medians): all maps of the log, and all readings of tags.",
-        &run_times(sets),
     )?;
     sets.iter().try_for_each(|set| results.plot(&format!("methods_{}", set.name), &distribution(set)))
 }
@@ -161,21 +156,6 @@ fn alignment_times(sets: &[Set]) -> Table {
                 time(|time| time.total),
                 significant(quantile(&apart, 1.0)),
             ]);
-        }
-    }
-    table
-}
-
-fn run_times(sets: &[Set]) -> Table {
-    let mut table = Table::new(["worlds", "method"].into_iter().chain(STAGES).chain(["all"]));
-    for set in sets {
-        for method in 0..METHODS.len() {
-            let time = |value: &dyn Fn(&Record) -> f64| {
-                significant(median(&of_method(set, method).map(value).collect::<Vec<_>>()))
-            };
-            let stages = (0..STAGES.len()).map(|stage| time(&|record| record.busy[stage]));
-            let cells = [set.title.clone(), (method + 1).to_string()].into_iter().chain(stages);
-            table.row(cells.chain([time(&Record::all_busy)]));
         }
     }
     table
