@@ -2,7 +2,7 @@
 
 use super::MESSAGE_INTERVAL;
 use super::bridge_settings::{bridge_kind, check, connect_parameters, settings};
-use super::link_choice::{Link, named_links};
+use super::link_choice::{Link, chosen_links};
 use super::running::{RunChoice, find_run};
 use crate::interrupt::stop_on_interrupt;
 use crate::status::Status;
@@ -74,17 +74,6 @@ pub(crate) fn bridge(args: &BridgeArgs, registry: &Registry) -> Result<Status> {
         bail!("{missed} messages were missed: the bridge was too slow");
     }
     Ok(if lost > 0 { Status::Failed } else { Status::Done })
-}
-
-/// The links of these names, each once.
-fn chosen_links(names: &[String], pipeline: &Pipeline) -> Result<Vec<Link>> {
-    let mut links = Vec::new();
-    for name in names {
-        links.extend(named_links(name, pipeline)?);
-    }
-    links.sort_by_key(|link| (link.stage, link.port));
-    links.dedup();
-    Ok(links)
 }
 
 /// The inputs of the bridge, one for each link.

@@ -25,11 +25,17 @@ pub(super) fn all_links(pipeline: &Pipeline) -> Vec<Link> {
     links.filter(is_read).collect()
 }
 
-/// Finds the links that a text names: `STAGE.PORT`, or `STAGE` for all links of the stage.
-pub(super) fn named_links(name: &str, pipeline: &Pipeline) -> Result<Vec<Link>> {
+/// Finds the links that texts name, each once: `STAGE.PORT`, or `STAGE` for all links of the stage.
+pub(super) fn chosen_links(texts: &[String], pipeline: &Pipeline) -> Result<Vec<Link>> {
     let links = all_links(pipeline);
-    let named = pipeline::named_links(name, THE_RUN, &names(&links, pipeline)).map_err(BadUse)?;
-    Ok(named.into_iter().map(|link| links[link]).collect())
+    let names = names(&links, pipeline);
+    let mut chosen = Vec::new();
+    for text in texts {
+        chosen.extend(pipeline::named_links(text, THE_RUN, &names).map_err(BadUse)?);
+    }
+    chosen.sort_unstable();
+    chosen.dedup();
+    Ok(chosen.into_iter().map(|link| links[link]).collect())
 }
 
 /// Finds the one link that a text names: `STAGE.PORT`, or `STAGE` if it has only one.

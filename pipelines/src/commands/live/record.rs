@@ -1,7 +1,7 @@
 //! `gridweave record`: writes the messages of links of a run to a log.
 
 use super::MESSAGE_INTERVAL;
-use super::link_choice::{Link, all_links, named_links};
+use super::link_choice::{Link, all_links, chosen_links};
 use super::running::{RunChoice, Running, find_run};
 use crate::interrupt::stop_on_interrupt;
 use crate::job::check_mcap_ending;
@@ -43,15 +43,10 @@ pub(crate) fn record(args: &RecordArgs, registry: &Registry) -> Result<Status> {
     check_mcap_ending(&args.output)?;
     check_writable(&args.output)?;
     let running = find_run(&args.run, registry)?;
-    let mut links = Vec::new();
-    for name in &args.links {
-        links.extend(named_links(name, &running.pipeline)?);
-    }
-    if args.links.is_empty() {
-        links = all_links(&running.pipeline);
-    }
-    links.sort_by_key(|link| (link.stage, link.port));
-    links.dedup();
+    let links = match args.links.is_empty() {
+        true => all_links(&running.pipeline),
+        false => chosen_links(&args.links, &running.pipeline)?,
+    };
     let stop = stop_on_interrupt("the recording is being closed");
     let mut recorders = links.iter().map(|&link| Recorder::new(&running, link)).collect::<Result<Vec<_>>>()?;
     let mut writer = LogWriter::create(&args.output, LogOptions::default())?;

@@ -172,14 +172,4 @@ mod tests {
         let mutual = format!("{certificates}authority = \"fleet.pem\"");
         assert_eq!(parameters(&mutual), mutual.parse().unwrap());
     }
-
-    #[test]
-    fn the_error_of_a_program_without_a_bridge_names_the_one_that_has_it() {
-        let remote = RemoteOptions { at: Vec::new(), set: Vec::new() };
-        let printing = PrintingOptions { json: false, count: None };
-        let link = ("robot1", "slam.map");
-        let run = RunChoice::default();
-        let error = tap_remote(link, &remote, &run, &printing, &Registry::default()).unwrap_err().to_string();
-        assert!(error.contains("gridweave-ros"), "{error}");
-    }
 }
