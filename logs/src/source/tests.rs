@@ -1,7 +1,7 @@
 use super::*;
 use crate::schemas::full_type_name;
 use crate::test_log::{Folder, TestLog, layouts};
-use gridweave_runtime::message::{Channel, LogTime, Message, MessageFlags, MessageHeader, Write};
+use gridweave_runtime::message::{Channel, LogTime, Message, MessageFlags, MessageHeader};
 use gridweave_runtime::ros::{
     Header, MapMetaData, Odometry, Pose, PoseStamped, PoseWithCovariance, RosMessage, TFMessage, TransformStamped,
 };
@@ -36,10 +36,6 @@ struct Port(&'static str, Everything);
 impl OutputSink for Port {
     fn send(&mut self, header: MessageHeader, bytes: &[u8]) -> Result<(), StageError> {
         self.1.0.borrow_mut().push((self.0, header, bytes.to_vec()));
-        Ok(())
-    }
-
-    fn send_in_place(&mut self, _: MessageHeader, _: &mut Write<'_>) -> Result<(), StageError> {
         Ok(())
     }
 }

@@ -1,7 +1,7 @@
 //! The outputs of a stage: an [`Out`] for each port, in a struct that the stage defines.
 
 use super::{OutputPort, PortType, StageError};
-use crate::message::{Blank, Channel, Filled, FixedText, LogTime, MessageFlags, MessageHeader, Write};
+use crate::message::{Blank, Channel, Filled, FixedText, LogTime, MessageFlags, MessageHeader, Write, write_vec};
 use crate::ros::{self, GridPrefix, OccupancyGrid, RosMessage};
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
@@ -14,8 +14,10 @@ pub trait OutputSink {
     /// Sends an encoded message; its bytes are copied once.
     fn send(&mut self, header: MessageHeader, bytes: &[u8]) -> Result<(), StageError>;
 
-    /// Sends a message of `header.length` bytes that `write` writes in place.
-    fn send_in_place(&mut self, header: MessageHeader, write: &mut Write<'_>) -> Result<(), StageError>;
+    /// Sends a message of `header.length` bytes that `write` writes: in place, or else into a buffer that is copied.
+    fn send_in_place(&mut self, header: MessageHeader, write: &mut Write<'_>) -> Result<(), StageError> {
+        self.send(header, &write_vec(Vec::new(), header.length as usize, write)?)
+    }
 }
 
 /// The output ports of a stage: a struct with an [`Out`] for each, or `()` for none.

@@ -1,7 +1,7 @@
 //! A harness that runs a single stage in tests and benches, and collects the messages that it sends.
 
 use super::{Context, Node, OutputEnd, OutputSink, StageError, StageKind};
-use crate::message::{FixedText, LogTime, Message, MessageHeader, Write, write_vec};
+use crate::message::{FixedText, LogTime, Message, MessageHeader};
 use crate::ros::{RosMessage, encode};
 use serde::de::DeserializeOwned;
 use std::cell::RefCell;
@@ -20,12 +20,6 @@ struct List(Rc<RefCell<Vec<Message>>>);
 impl OutputSink for List {
     fn send(&mut self, header: MessageHeader, bytes: &[u8]) -> Result<(), StageError> {
         self.0.borrow_mut().push(Message::from_vec(header, bytes.to_vec()));
-        Ok(())
-    }
-
-    fn send_in_place(&mut self, header: MessageHeader, write: &mut Write<'_>) -> Result<(), StageError> {
-        let bytes = write_vec(Vec::new(), header.length as usize, write)?;
-        self.0.borrow_mut().push(Message::from_vec(header, bytes));
         Ok(())
     }
 }

@@ -1,7 +1,7 @@
 //! The stage as a whole: messages in, messages out.
 
 use super::kind;
-use gridweave_runtime::message::{LogTime, Message, MessageHeader, Write, write_vec};
+use gridweave_runtime::message::{LogTime, Message, MessageHeader};
 use gridweave_runtime::ros::{
     DeformationNode, MapDeformation, MapMetaData, OccupancyGrid, Pose, RobotFrame, RobotFrames, UnmergedRobot, encode,
 };
@@ -120,11 +120,6 @@ impl OutputSink for List {
     fn send(&mut self, _: MessageHeader, bytes: &[u8]) -> Result<(), StageError> {
         self.0.borrow_mut().push(bytes.to_vec());
         Ok(())
-    }
-
-    fn send_in_place(&mut self, header: MessageHeader, write: &mut Write<'_>) -> Result<(), StageError> {
-        let bytes = write_vec(Vec::new(), header.length as usize, write)?;
-        self.send(header, &bytes)
     }
 }
 

@@ -190,10 +190,6 @@ mod tests {
                 self.0.borrow_mut().push(bytes.to_vec());
                 Ok(())
             }
-
-            fn send_in_place(&mut self, _: MessageHeader, _: &mut Write<'_>) -> Result<(), StageError> {
-                Ok(())
-            }
         }
         for name in [PoseStamped::NAME, OccupancyGrid::NAME, TagRange::NAME] {
             assert!(begins_with_header(name), "{name}");
