@@ -2,7 +2,7 @@
 
 use crate::file::{WriteError, replace};
 use crate::qos;
-use crate::reader::{LogFile, ReadError, Statistics};
+use crate::reader::{FileStatistics, LogFile, ReadError};
 use gridweave_runtime::message::Channel;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -173,7 +173,7 @@ struct TopicMetadata {
 
 /// The text of `metadata.yaml` for a log.
 fn description(log: &LogFile, name: &str) -> String {
-    let Statistics { messages, first, last, by_channel } = log.statistics().cloned().unwrap_or_default();
+    let FileStatistics { messages, first, last, by_channel } = log.statistics().cloned().unwrap_or_default();
     let span = Span {
         duration: Duration { nanoseconds: last.saturating_sub(first) },
         starting_time: Start { nanoseconds_since_epoch: first },

@@ -10,7 +10,7 @@ use serde::Serialize;
 use std::fmt;
 
 /// A place in two maps: x and y in the map frame of the second robot by name, and then in that of the first, metres.
-pub(crate) type CommonPlace = [f64; 4];
+pub(crate) type PlacePair = [f64; 4];
 
 /// Distances between common places in the merge of two robots.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -54,7 +54,7 @@ pub struct Distances {
 
 /// Measures a merge of the robots `first` and `second`. `None` if they are not merged with each other, or there are no
 /// places.
-pub(crate) fn measure(run: &Summary, [first, second]: [&str; 2], places: &[CommonPlace]) -> Option<CommonPlaces> {
+pub(crate) fn measure(run: &Summary, [first, second]: [&str; 2], places: &[PlacePair]) -> Option<CommonPlaces> {
     let one =
         Placed { frame: pose(run.frames.get(first)?), deformation: run.deformations.get(first).and_then(deformation) };
     let other = Placed {
@@ -62,7 +62,7 @@ pub(crate) fn measure(run: &Summary, [first, second]: [&str; 2], places: &[Commo
         deformation: run.deformations.get(second).and_then(deformation),
     };
     let distances = |is_deformed: bool| {
-        let apart = |&[x2, y2, x1, y1]: &CommonPlace| {
+        let apart = |&[x2, y2, x1, y1]: &PlacePair| {
             (one.in_world(Point2::new(x1, y1), is_deformed) - other.in_world(Point2::new(x2, y2), is_deformed)).norm()
         };
         Distances::of(places.iter().map(apart).collect())
@@ -76,10 +76,10 @@ pub(crate) fn measure(run: &Summary, [first, second]: [&str; 2], places: &[Commo
     })
 }
 
-fn from_best(run: &Summary, [first, second]: [&str; 2], places: &[CommonPlace]) -> Option<FromBest> {
+fn from_best(run: &Summary, [first, second]: [&str; 2], places: &[PlacePair]) -> Option<FromBest> {
     let (frame_a, frame_b) = (run.frames.get(first)?, run.frames.get(second)?);
     let found = pose(frame_a).inverse() * pose(frame_b);
-    let of_both = |&[x2, y2, x1, y1]: &CommonPlace| (Point2::new(x1, y1), Point2::new(x2, y2));
+    let of_both = |&[x2, y2, x1, y1]: &PlacePair| (Point2::new(x1, y1), Point2::new(x2, y2));
     let pairs: Vec<PointPair> = places.iter().map(of_both).map(|(a, b)| PointPair { a, b, weight: 1.0 }).collect();
     let best = fit_rigid(&pairs)?.transform_a_b;
     let middle: Point2<f64> =
@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn distances_are_measured_by_the_frames_and_with_the_deformations() {
-        let places: Vec<CommonPlace> = (0..=10).map(|i| [1.0, 1.0, 11.0 + 0.1 * f64::from(i), 1.0]).collect();
+        let places: Vec<PlacePair> = (0..=10).map(|i| [1.0, 1.0, 11.0 + 0.1 * f64::from(i), 1.0]).collect();
         let measured = measure(&summary(&[("robot2", 0.5)]), ["robot1", "robot2"], &places).unwrap();
         let near = |one: f64, other: f64| (one - other).abs() < 1e-9;
         assert!(
@@ -189,7 +189,7 @@ mod tests {
             let (x, y) = (f64::from(i % 5), f64::from(i / 5));
             [x + 0.2, y + if i % 2 == 0 { 0.1 } else { -0.1 }, x + 10.0, y]
         };
-        let places: Vec<CommonPlace> = (0..20).map(place).collect();
+        let places: Vec<PlacePair> = (0..20).map(place).collect();
         let mut run = summary(&[]);
         run.reference = Some("robot1".into());
         let covariance = [0.04, 0.0, 0.0, 0.0, 0.04, 0.0, 0.0, 0.0, 0.01];

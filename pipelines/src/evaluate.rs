@@ -9,7 +9,7 @@
 //! by the rigid frames and with the deformations, and the error of the frames against the best rigid fit of these
 //! places.
 
-use crate::common_places::{self, CommonPlace, CommonPlaces, normalised_error_squared, pose};
+use crate::common_places::{self, CommonPlaces, PlacePair, normalised_error_squared, pose};
 use crate::merge_text::short;
 use crate::table::Table;
 use crate::text_wrapping::wrap;
@@ -86,7 +86,7 @@ pub struct Evaluation {
 }
 
 #[derive(Deserialize)]
-struct Truth {
+struct TruthFile {
     /// Poses of the map frames; empty if the robots are unrelated.
     frames: BTreeMap<String, Frame>,
     /// The middle of each robot's last map, in its map frame.
@@ -94,7 +94,7 @@ struct Truth {
     centres: BTreeMap<String, [f64; 2]>,
     /// Places that the first two robots by name have both seen.
     #[serde(default)]
-    common: Vec<CommonPlace>,
+    common: Vec<PlacePair>,
 }
 
 /// Compares the summary of `gridweave run --summary` with a truth file. Where the truth has no frames, the
@@ -123,7 +123,7 @@ pub(crate) fn read_summary(path: &Path) -> Result<Summary> {
 
 /// Checks that [`evaluate`] can read a truth file.
 pub(crate) fn check_truth(path: &Path) -> Result<()> {
-    read::<Truth>(path, "a truth file").map(|_| ())
+    read::<TruthFile>(path, "a truth file").map(|_| ())
 }
 
 /// Reads a JSON file.
@@ -133,7 +133,7 @@ fn read<T: DeserializeOwned>(path: &Path, what: &str) -> Result<T> {
     serde_json::from_slice(&text).with_context(|| format!("{} is not {what}", path.display()))
 }
 
-fn measure(run: &Summary, truth: &Truth) -> Result<Evaluation> {
+fn measure(run: &Summary, truth: &TruthFile) -> Result<Evaluation> {
     let related = !truth.frames.is_empty();
     let transform_reference_truth = match &run.reference {
         Some(reference) if related => match truth.frames.get(reference) {

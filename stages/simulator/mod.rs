@@ -13,11 +13,11 @@
 //!
 //! Nothing moves in these worlds but the robots, which do not see each other; floors are flat, and there is no glass.
 
+mod clearances;
 mod drawn_map;
 mod drift;
 mod drive;
 mod floor_plan;
-mod free_space;
 mod furniture;
 mod lidar;
 mod mapper;

@@ -1,6 +1,6 @@
 //! Path planning: A* over the raster of free space, with a cost near walls, and then smoothing.
 
-use super::free_space::{FREE_CLEARANCE, FreeSpace, ROBOT_RADIUS};
+use super::clearances::{Clearances, FREE_CLEARANCE, ROBOT_RADIUS};
 use crate::shared::geometry::Point2;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -14,7 +14,7 @@ const SMOOTHING: usize = 40;
 
 /// The cheapest path between two points, as points about 0.1 m apart; `None` if one cannot be reached from the other.
 /// Near walls a metre costs more.
-pub(super) fn plan_path(space: &FreeSpace, from: &Point2, to: &Point2) -> Option<Vec<Point2>> {
+pub(super) fn plan_path(space: &Clearances, from: &Point2, to: &Point2) -> Option<Vec<Point2>> {
     let (start, goal) = (space.index(from), space.index(to));
     if !(space.is_reachable_at(start) && space.is_reachable_at(goal)) {
         return None;
@@ -52,7 +52,7 @@ fn units(metres: f64) -> u64 {
     (metres * UNITS_PER_METRE) as u64
 }
 
-fn trace(space: &FreeSpace, parents: &[usize], goal: usize) -> Vec<Point2> {
+fn trace(space: &Clearances, parents: &[usize], goal: usize) -> Vec<Point2> {
     let steps = std::iter::successors(Some(goal), |&index| parents.get(index).copied().filter(|&p| p != usize::MAX));
     let mut path: Vec<Point2> = steps.map(|index| space.centre(index)).collect();
     path.reverse();
@@ -61,7 +61,7 @@ fn trace(space: &FreeSpace, parents: &[usize], goal: usize) -> Vec<Point2> {
 
 /// Smooths the corners of the raster: every point moves towards the midpoint of its neighbours as long as a robot
 /// fits there. The ends stay.
-pub(super) fn smooth_path(space: &FreeSpace, path: &mut [Point2]) {
+pub(super) fn smooth_path(space: &Clearances, path: &mut [Point2]) {
     for _ in 0..SMOOTHING {
         for index in 1..path.len().saturating_sub(1) {
             let middle = nalgebra::center(&path[index - 1], &path[index + 1]);
@@ -79,7 +79,7 @@ mod tests {
     use crate::simulator::shape::{Rectangle, Solid};
 
     /// A room cut in two by a wall with a gap at its upper end, and a closed box in the right half.
-    fn space() -> FreeSpace {
+    fn space() -> Clearances {
         let solids: Vec<Solid> = [
             Rectangle::new(0.0, -0.1, 6.0, 0.0),
             Rectangle::new(0.0, 4.0, 6.0, 4.1),
@@ -91,7 +91,7 @@ mod tests {
         ]
         .map(Solid::from)
         .to_vec();
-        FreeSpace::new(&Rectangle::new(0.0, 0.0, 6.0, 4.0), &solids, &Point2::new(1.0, 1.0))
+        Clearances::new(&Rectangle::new(0.0, 0.0, 6.0, 4.0), &solids, &Point2::new(1.0, 1.0))
     }
 
     #[test]

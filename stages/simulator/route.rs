@@ -1,7 +1,7 @@
 //! Which rooms each robot visits, and the way through them.
 
+use super::clearances::Clearances;
 use super::floor_plan::FloorPlan;
-use super::free_space::FreeSpace;
 use super::planner::{plan_path, smooth_path};
 use super::room::Room;
 use crate::shared::geometry::Point2;
@@ -33,7 +33,7 @@ pub(super) fn share_rooms(rooms: usize, robots: usize, overlap: f64) -> Vec<Rang
 /// can be reached.
 pub(super) fn plan_route(
     plan: &FloorPlan,
-    space: &FreeSpace,
+    space: &Clearances,
     rooms: Range<usize>,
     random: &mut impl Rng,
 ) -> Vec<Point2> {
@@ -62,7 +62,7 @@ pub(super) fn plan_route(
 }
 
 /// Places in a room that are far from each other.
-fn stops_in(space: &FreeSpace, room: &Room, random: &mut impl Rng) -> Vec<Point2> {
+fn stops_in(space: &Clearances, room: &Room, random: &mut impl Rng) -> Vec<Point2> {
     let mut places = space.places_in(&room.bounds.expanded(-STOP_CLEARANCE));
     if places.iter().any(|place| space.clearance(place) >= STOP_CLEARANCE) {
         places.retain(|place| space.clearance(place) >= STOP_CLEARANCE);

@@ -1,7 +1,7 @@
 //! A map of a building scanned from many positions, with small errors of their poses.
 
+use super::clearances::Clearances;
 use super::floor_plan::FloorPlan;
-use super::free_space::FreeSpace;
 use super::lidar::Lidar;
 use super::mapper::Mapper;
 use super::ray_caster::RayCaster;
@@ -53,7 +53,7 @@ pub(super) fn scan_building(
     settings: &ScanSettings,
     random: &mut impl Rng,
 ) -> SnapshotMap {
-    let places = FreeSpace::of(plan).places_in(&plan.bounds);
+    let places = Clearances::of(plan).places_in(&plan.bounds);
     let caster = RayCaster::new(&plan.solids);
     let ScanSettings { beams, reach, noise, dropped, .. } = *settings;
     let lidar = Lidar { beams, field_of_view: TAU, reach, noise, dropped };

@@ -4,8 +4,8 @@
 //! Gaussian noise; some readings are lost, and some are reflected and too long by 0.3 m to 2 m. The signal strength
 //! falls with the square of the distance, from -45 dBm at one metre, with a deviation of 2 dB.
 
+use super::clearances::Clearances;
 use super::floor_plan::FloorPlan;
-use super::free_space::FreeSpace;
 use super::ray_caster::RayCaster;
 use super::room::WALL;
 use super::shape::{Rectangle, between};
@@ -93,7 +93,7 @@ impl TagReader {
 /// There may be fewer than `count` where walls are short.
 pub(super) fn place_tags(
     plan: &FloorPlan,
-    space: &FreeSpace,
+    space: &Clearances,
     world: &RayCaster,
     count: usize,
     random: &mut impl Rng,
@@ -157,7 +157,7 @@ fn on_border(area: &Rectangle, random: &mut impl Rng) -> (Point2, Vector2<f64>) 
 }
 
 /// Whether there is a wall behind a place and a robot in front of it could read a tag there.
-fn is_visible(plan: &FloorPlan, space: &FreeSpace, world: &RayCaster, place: &Point2, inwards: &Vector2<f64>) -> bool {
+fn is_visible(plan: &FloorPlan, space: &Clearances, world: &RayCaster, place: &Point2, inwards: &Vector2<f64>) -> bool {
     let outwards = (-inwards.y).atan2(-inwards.x);
     world.cast(place, outwards, WALL / 2.0).is_some()
         && plan.solids.iter().all(|solid| solid.distance(place) > OFF_WALL / 2.0)

@@ -1,7 +1,7 @@
 //! Common parts of the robots of a simulation: the building, its tags, and random numbers.
 
+use super::clearances::Clearances;
 use super::floor_plan::FloorPlan;
-use super::free_space::FreeSpace;
 use super::parameters::SimulatorParameters;
 use super::ray_caster::RayCaster;
 use super::tags::{Tag, place_tags};
@@ -32,7 +32,7 @@ pub enum SimulationError {
 /// Common parts of the robots.
 pub(super) struct World {
     pub(super) plan: FloorPlan,
-    pub(super) space: FreeSpace,
+    pub(super) space: Clearances,
     pub(super) caster: RayCaster,
     pub(super) tags: Vec<Tag>,
     seed: u64,
@@ -56,7 +56,7 @@ pub(super) enum Stream {
 impl World {
     pub(super) fn new(parameters: &SimulatorParameters, seed: u64) -> Self {
         let plan = FloorPlan::random(&parameters.building(), &mut random(seed, Stream::Building));
-        let space = FreeSpace::of(&plan);
+        let space = Clearances::of(&plan);
         let caster = RayCaster::new(&plan.solids);
         let count = parameters.tags as usize;
         let tags = place_tags(&plan, &space, &caster, count, &mut random(seed, Stream::TagPlaces));
@@ -68,7 +68,7 @@ impl World {
         let mut random = self.random(Stream::Furniture(robot));
         let plan = self.plan.rearranged(parameters.moved, &parameters.building(), &mut random);
         Self {
-            space: FreeSpace::of(&plan),
+            space: Clearances::of(&plan),
             caster: RayCaster::new(&plan.solids),
             plan,
             tags: self.tags.clone(),

@@ -14,7 +14,7 @@ const MOST_VALUES: usize = 1 << 21;
 
 /// The error when a message cannot be decoded.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum DecodeError {
+pub enum SchemaMismatch {
     /// The bytes do not start with a CDR encapsulation header.
     #[error("the message does not begin with a CDR encapsulation")]
     Encapsulation,
@@ -57,16 +57,16 @@ impl Fault {
 
 impl Schema {
     /// Decodes a message. Strings and byte arrays are borrowed from it, and field names from the schema.
-    pub fn decode<'a>(&'a self, bytes: &'a [u8]) -> Result<Value<'a>, DecodeError> {
-        let mut reader = CdrReader::new(bytes).ok_or(DecodeError::Encapsulation)?;
+    pub fn decode<'a>(&'a self, bytes: &'a [u8]) -> Result<Value<'a>, SchemaMismatch> {
+        let mut reader = CdrReader::new(bytes).ok_or(SchemaMismatch::Encapsulation)?;
         reader.limit_values(MOST_VALUES);
         let Some(root) = self.root() else { return Ok(Value::Message(Vec::new())) };
         let value = self
             .message(root, &mut reader)
-            .map_err(|fault| DecodeError::Field { path: fault.path(), fault: fault.fault })?;
+            .map_err(|fault| SchemaMismatch::Field { path: fault.path(), fault: fault.fault })?;
         match reader.left() {
             0..=PADDING => Ok(value),
-            rest => Err(DecodeError::Rest(rest)),
+            rest => Err(SchemaMismatch::Rest(rest)),
         }
     }
 

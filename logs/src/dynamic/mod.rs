@@ -37,7 +37,7 @@ mod value;
 mod tests;
 
 pub use compare::{Difference, Differences, compare, nearly_equal};
-pub use decode::DecodeError;
+pub use decode::SchemaMismatch;
 pub use json::JsonOptions;
 pub use path::{FieldPath, PathError};
 pub use reader::DecodeFault;

@@ -1,6 +1,6 @@
 //! Copying of messages field by field: with renamed frames, or converted from ROS 1.
 
-use super::decode::DecodeError;
+use super::decode::SchemaMismatch;
 use super::definition::{Count, Primitive};
 use super::reader::{CdrReader, DecodeFault};
 use super::schema::{Element, Field, MessageType, Schema};
@@ -55,8 +55,8 @@ impl Recoder {
         rename: &dyn Fn(&str) -> Cow<'_, str>,
         later: i64,
         copy: &mut Vec<u8>,
-    ) -> Result<bool, DecodeError> {
-        let reader = || CdrReader::new(message).ok_or(DecodeError::Encapsulation);
+    ) -> Result<bool, SchemaMismatch> {
+        let reader = || CdrReader::new(message).ok_or(SchemaMismatch::Encapsulation);
         // Most messages contain few frames, and are long.
         if !self.walk(reader()?, rename, later, None)? {
             return Ok(false);
@@ -69,7 +69,7 @@ impl Recoder {
     ///
     /// # Errors
     /// The message does not match its schema. `copy` is unchanged.
-    pub fn append_ros1(&self, message: &[u8], copy: &mut Vec<u8>) -> Result<(), DecodeError> {
+    pub fn append_ros1(&self, message: &[u8], copy: &mut Vec<u8>) -> Result<(), SchemaMismatch> {
         self.walk(CdrReader::ros1(message), &|frame| Cow::Borrowed(frame), 0, Some(copy)).map(|_| ())
     }
 
@@ -80,7 +80,7 @@ impl Recoder {
         rename: &dyn Fn(&str) -> Cow<'_, str>,
         later: i64,
         mut copy: Option<&mut Vec<u8>>,
-    ) -> Result<bool, DecodeError> {
+    ) -> Result<bool, SchemaMismatch> {
         let big_endian = reader.is_big_endian();
         let begin = copy.as_ref().map_or(0, |copy| copy.len());
         if let Some(copy) = &mut copy {
@@ -95,7 +95,7 @@ impl Recoder {
             if let Some(copy) = writer.bytes {
                 copy.truncate(begin);
             }
-            DecodeError::Field { path, fault }
+            SchemaMismatch::Field { path, fault }
         })?;
         Ok(walk.is_renamed)
     }

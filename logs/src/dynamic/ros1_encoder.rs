@@ -1,6 +1,6 @@
 //! Conversion of messages from CDR to the encoding of ROS 1.
 
-use super::decode::DecodeError;
+use super::decode::SchemaMismatch;
 use super::definition::{Count, Primitive};
 use super::reader::{CdrReader, DecodeFault};
 use super::schema::{Element, Field, MessageType, Schema};
@@ -32,14 +32,14 @@ impl Ros1Encoder {
     ///
     /// # Errors
     /// The message does not match its schema. `out` is unchanged.
-    pub(crate) fn append(&self, message: &[u8], sequence: u32, out: &mut Vec<u8>) -> Result<(), DecodeError> {
-        let mut reader = CdrReader::new(message).ok_or(DecodeError::Encapsulation)?;
+    pub(crate) fn append(&self, message: &[u8], sequence: u32, out: &mut Vec<u8>) -> Result<(), SchemaMismatch> {
+        let mut reader = CdrReader::new(message).ok_or(SchemaMismatch::Encapsulation)?;
         let Some(root) = self.schema.types.len().checked_sub(1) else { return Ok(()) };
         let begin = out.len();
         out.reserve(message.len() + 16);
         self.message(root, sequence, &mut reader, &mut Some(&mut *out)).map_err(|(path, fault)| {
             out.truncate(begin);
-            DecodeError::Field { path, fault }
+            SchemaMismatch::Field { path, fault }
         })
     }
 

@@ -250,8 +250,8 @@ fn bytes_that_do_not_match_give_an_error_with_the_field() {
     assert!(of(&[1, 0, 0, 0, 1, 0, 0, 0, 0, 7]).ends_with("the boolean is 7 at `list[0].ok`"));
     assert!(of(&[1, 0, 0, 0, 1, 0, 0, 0, 0xff, 1]).ends_with("the string is not UTF-8 at `list[0].name`"));
     assert!(of(&[0, 0, 0, 0, 1, 2, 3, 4]).contains("4 bytes are left"));
-    assert_eq!(schema.decode(&[0, 1, 0]), Err(DecodeError::Encapsulation));
-    assert_eq!(schema.decode(&[0, 7, 0, 0, 0]), Err(DecodeError::Encapsulation));
+    assert_eq!(schema.decode(&[0, 1, 0]), Err(SchemaMismatch::Encapsulation));
+    assert_eq!(schema.decode(&[0, 7, 0, 0, 0]), Err(SchemaMismatch::Encapsulation));
     let wide = Schema::parse("a/A", "wstring s").unwrap();
     assert!(wide.decode(&[0, 1, 0, 0, 0, 0, 0, 0]).unwrap_err().to_string().contains("wstring"));
 }
@@ -267,7 +267,7 @@ fn a_claimed_length_allocates_nothing_that_is_not_there() {
     ] {
         let schema = Schema::parse("a/A", text).unwrap();
         let error = schema.decode(&[0, 1, 0, 0, 255, 255, 255, 255, 1, 2, 3]).unwrap_err();
-        assert!(matches!(error, DecodeError::Field { fault: DecodeFault::Count(_), .. }), "{text}: {error}");
+        assert!(matches!(error, SchemaMismatch::Field { fault: DecodeFault::Count(_), .. }), "{text}: {error}");
     }
 }
 
@@ -294,7 +294,7 @@ fn fields_without_bytes_are_limited_by_the_length_of_the_message() {
         |count: u32, rest: usize| [&[0, 1, 0, 0][..], &[0; 4], &count.to_le_bytes(), &vec![0; rest]].concat();
     let schema = Schema::parse("a/A", &fields_without_bytes(1000)).unwrap();
     let is_refused = |bytes: &[u8]| match schema.decode(bytes) {
-        Err(DecodeError::Field { fault: DecodeFault::Values(most), .. }) => most <= 8 * bytes.len() + 256,
+        Err(SchemaMismatch::Field { fault: DecodeFault::Values(most), .. }) => most <= 8 * bytes.len() + 256,
         _ => false,
     };
     assert!(is_refused(&elements(10_000, 10_000)) && is_refused(&elements(8, 8)));
@@ -303,7 +303,7 @@ fn fields_without_bytes_are_limited_by_the_length_of_the_message() {
     let long = |count: u32| [&[0, 1, 0, 0][..], &count.to_le_bytes(), &vec![0; count as usize]].concat();
     assert!(flat.decode(&long(10_000)).is_ok());
     let error = flat.decode(&long(2_000_000)).unwrap_err();
-    assert!(matches!(error, DecodeError::Field { fault: DecodeFault::Values(2_097_152), .. }), "{error}");
+    assert!(matches!(error, SchemaMismatch::Field { fault: DecodeFault::Values(2_097_152), .. }), "{error}");
     // A few of them are read.
     let few = Schema::parse("a/A", &fields_without_bytes(3)).unwrap();
     assert!(few.decode(&elements(3, 3)).is_ok());
@@ -317,7 +317,7 @@ fn a_converted_message_is_limited_by_the_length_of_the_message() {
     let message = 1000_u32.to_le_bytes().repeat(500);
     let mut copy = Vec::new();
     let error = recoder.append_ros1(&message, &mut copy).unwrap_err();
-    assert!(matches!(error, DecodeError::Field { fault: DecodeFault::Values(_), .. }), "{error}");
+    assert!(matches!(error, SchemaMismatch::Field { fault: DecodeFault::Values(_), .. }), "{error}");
     assert!(copy.is_empty());
     let few = [2_u32.to_le_bytes().repeat(500), vec![0; 8]].concat();
     recoder.append_ros1(&few, &mut copy).unwrap();

@@ -1,6 +1,6 @@
 //! The names that a log has for the robot, or the robots, that the user gives another name.
 
-use super::{Convention, Input, NameRules};
+use super::{Input, NameRules, TopicNaming};
 use crate::robots::{RobotChannels, Role};
 use crate::tf::tf_topic;
 use gridweave_runtime::message::Channel;
@@ -47,7 +47,7 @@ impl LoggedName {
         let mut with_maps = of_role(|role| role == Role::Map);
         with_maps.remove(robot);
         // A missing robot matters only if robots are looked for.
-        let matters = !with_maps.is_empty() && rules.convention == Convention::ByRobot;
+        let matters = !with_maps.is_empty() && rules.convention == TopicNaming::ByRobot;
         if matters { Self::Several(with_maps) } else { Self::Same }
     }
 

@@ -35,7 +35,7 @@ pub use file_names::{FileNameError, name_map_files, robot_names};
 pub use input::Input;
 pub use rename::TopicRename;
 pub use rename_advice::{rename_advice, scan_rename_advice};
-pub use rules::{Convention, NameRules};
+pub use rules::{NameRules, TopicNaming};
 pub(crate) use shared_frames::SharedFrames;
 
 use crate::reader::{LogFile, LogMessage, LogReader, log_files};
@@ -71,7 +71,7 @@ pub fn open(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result
     let inputs = name_maps(&files, &input_of, inputs)?;
     let files: Arc<[LogFile]> = files.into();
     let mut names = naming::name(&files, &input_of, &inputs, rules, robots)?;
-    if rules.convention == Convention::ByRobot {
+    if rules.convention == TopicNaming::ByRobot {
         names.share_frames(&files, robots);
     }
     Ok((LogReader::of(files), names))

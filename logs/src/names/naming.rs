@@ -7,7 +7,7 @@ use super::logged_name::LoggedName;
 use super::map_frame_robot::nameless_map;
 use super::rules::fits;
 use super::shown_robots::ShownRobots;
-use super::{Convention, Input, NameError, NameRules, Names};
+use super::{Input, NameError, NameRules, Names, TopicNaming};
 use crate::reader::LogFile;
 use crate::robots::{RobotChannels, Role, robots_with_unread_maps};
 use crate::tf::{is_static, tf_topic};
@@ -50,8 +50,8 @@ pub(super) fn name(
 ) -> Result<Names, NameError> {
     let mut drafts: Vec<Draft> = drafts(files, rules);
     let shown = match rules.convention {
-        Convention::AsLogged => ShownRobots::default(),
-        Convention::ByRobot => {
+        TopicNaming::AsLogged => ShownRobots::default(),
+        TopicNaming::ByRobot => {
             let mut channels: Vec<Vec<NumberedChannel<'_>>> = vec![Vec::new(); inputs.len()];
             for Draft { file, number, channel, .. } in &drafts {
                 if let Some(of_input) = input_of.get(*file).and_then(|&input| channels.get_mut(input)) {
@@ -69,8 +69,8 @@ pub(super) fn name(
         }
     }
     let (of_input, note) = match rules.convention {
-        Convention::AsLogged => (inputs.iter().map(|input| input.robot.clone()).collect(), None),
-        Convention::ByRobot => infer_robots(inputs, &of_inputs, robots, &shown)?,
+        TopicNaming::AsLogged => (inputs.iter().map(|input| input.robot.clone()).collect(), None),
+        TopicNaming::ByRobot => infer_robots(inputs, &of_inputs, robots, &shown)?,
     };
     let logged_names: Vec<LoggedName> =
         inputs.iter().zip(&of_inputs).map(|(input, channels)| LoggedName::of(input, channels, rules, robots)).collect();
@@ -84,7 +84,7 @@ pub(super) fn name(
     check_renamed(&drafts)?;
 
     let roles = RobotChannels::new(robots.clone(), drafts.iter().map(|draft| &draft.channel));
-    if rules.convention == Convention::ByRobot {
+    if rules.convention == TopicNaming::ByRobot {
         check_robots(&drafts, &roles, files, input_of, inputs)?;
     }
     let mut known = known_robots(&roles, &drafts);
@@ -108,7 +108,7 @@ pub(super) fn name(
         // Maps, and poses in them, are always in the robot's map frame.
         let is_robots =
             is_map || matches!(classified.role, Role::Pose(_) | Role::Odometry | Role::TagMessage | Role::Scan);
-        let by_role = is_robots && rules.convention == Convention::ByRobot;
+        let by_role = is_robots && rules.convention == TopicNaming::ByRobot;
         let robot = robot.or(by_role.then(|| classified.robot.to_owned())).unwrap_or_default();
         let is_wanted = rules.wants(&channel.topic, robot_of(&known, robots, &channel.topic));
         if let Some(of_file) = channels.get_mut(file) {
@@ -132,7 +132,7 @@ fn drafts(files: &[LogFile], rules: &NameRules) -> Vec<Draft> {
         Draft { file, number, channel: Channel { topic, ..channel }, logged, is_renamed, robot: None }
     };
     let of_file = |(file, log): (usize, &LogFile)| {
-        let is_silent = |number: u16| rules.convention == Convention::ByRobot && log.is_silent(number);
+        let is_silent = |number: u16| rules.convention == TopicNaming::ByRobot && log.is_silent(number);
         let channels = log.channels().filter(|(number, _)| !is_silent(*number));
         channels.map(|(number, channel)| draft(file, number, channel)).collect::<Vec<_>>()
     };
@@ -163,7 +163,7 @@ fn put_under_robots(drafts: &mut [Draft], robot_of_file: &[Option<String>], rule
     for Draft { file, channel, is_renamed, robot, .. } in drafts {
         let prefix = match of_file(*file) {
             Some(robot) => robot,
-            None if rules.convention == Convention::AsLogged => continue,
+            None if rules.convention == TopicNaming::AsLogged => continue,
             None => match tree_of(&trees, &channel.topic) {
                 Some(robot) => robot,
                 None => continue,

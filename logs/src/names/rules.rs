@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// The convention for the names of topics and frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Convention {
+pub enum TopicNaming {
     /// Named under robots: of logs with equal topics, each is put under the name of its file; frames without a robot
     /// name get one, where the log has `/ROBOT/tf`, and in maps and poses; and `/ROBOT/tf` becomes `/tf`.
     #[default]
@@ -22,7 +22,7 @@ pub enum Convention {
 #[derive(Clone, Debug, Default)]
 pub struct NameRules {
     /// The naming convention.
-    pub convention: Convention,
+    pub convention: TopicNaming,
     /// Topics to rename.
     pub renames: Vec<TopicRename>,
     /// The robots to read; empty for all.

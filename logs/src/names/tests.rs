@@ -48,7 +48,7 @@ fn topics_under_a_robot_have_its_name_once_and_transforms_share_a_topic() {
         ],
     );
     let input = Input { robot: Some("robot1".into()), path };
-    for convention in [Convention::ByRobot, Convention::AsLogged] {
+    for convention in [TopicNaming::ByRobot, TopicNaming::AsLogged] {
         let rules = NameRules { convention, ..Default::default() };
         let expected = ["/robot1/map", "/robot1/scan", "/tf", "/tf_static", "/robot1/odd/tf"];
         assert_eq!(topics(std::slice::from_ref(&input), &rules), [expected]);
@@ -68,7 +68,7 @@ fn logs_with_equal_topics_are_named_after_their_files_unless_names_stay_as_logge
     assert!(note.contains("red.mcap to red") && note.contains("ROBOT=LOG"), "{note}");
     assert_eq!((names.robot_of_file(0), names.robot_of_file(1)), (Some("red"), Some("blue")));
 
-    let as_logged = NameRules { convention: Convention::AsLogged, ..Default::default() };
+    let as_logged = NameRules { convention: TopicNaming::AsLogged, ..Default::default() };
     assert_eq!(topics(&inputs(&paths), &as_logged)[1], ["/map", "/amcl_pose", "/x"]);
     let mut half = inputs(&paths);
     half[0].robot = Some("red1".into());
@@ -134,7 +134,7 @@ fn a_log_that_has_another_name_for_its_robot_gets_the_one_that_is_given() {
     log.add("/robot1/map", OccupancyGrid::NAME, 1, &map).add("/tf", TFMessage::NAME, 2, &tf).raw("/x", "p/X", 3, b"");
     let path = folder.write("a.mcap", &log.finish());
     let input = Input { robot: Some("a".into()), path };
-    for convention in [Convention::ByRobot, Convention::AsLogged] {
+    for convention in [TopicNaming::ByRobot, TopicNaming::AsLogged] {
         let rules = NameRules { convention, ..Default::default() };
         assert_eq!(topics(std::slice::from_ref(&input), &rules), [["/a/map", "/tf", "/a/x"]]);
     }

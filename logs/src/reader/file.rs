@@ -10,7 +10,7 @@ use super::map;
 use super::ros1::{self, Bag};
 use super::sqlite::{self, Database};
 use super::storage::Storage;
-use super::summary::Statistics;
+use super::summary::FileStatistics;
 use super::supplement::SupplementKind;
 use crate::map_file::Thresholds;
 use gridweave_runtime::message::Channel;
@@ -136,7 +136,7 @@ impl LogFile {
     }
 
     /// The statistics record of an MCAP file; `None` if it has none or is damaged.
-    pub fn statistics(&self) -> Option<&Statistics> {
+    pub fn statistics(&self) -> Option<&FileStatistics> {
         let is_whole = self.layout.damage.iter().all(|damage| matches!(damage, Damage::Incomplete { .. }));
         self.layout.statistics.as_ref().filter(|_| is_whole)
     }

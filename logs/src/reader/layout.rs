@@ -7,7 +7,7 @@ use super::damage::{ChunkFault, Damage, LARGEST, MOST_REPORTS};
 use super::definitions::Definitions;
 use super::expansion::drop_excess;
 use super::record::{Fields, HEAD, MessageRecord, Record};
-use super::summary::{Statistics, SummarySection};
+use super::summary::{FileStatistics, SummarySection};
 use super::supplement::{SupplementKind, damage_of, read_metadata};
 use mcap::MAGIC;
 use mcap::records::op;
@@ -32,7 +32,7 @@ pub(crate) struct Layout {
     /// The message indexes after the chunks, by channel.
     pub(crate) index: BTreeMap<u16, IndexedChannel>,
     /// The statistics of the file, if it was closed.
-    pub(crate) statistics: Option<Statistics>,
+    pub(crate) statistics: Option<FileStatistics>,
     /// The number of chunks, including bad ones.
     pub(crate) chunks: usize,
     /// The compressions of the chunks; an empty string for none.

@@ -55,7 +55,7 @@ pub(crate) use layout::IndexedChannel;
 pub(crate) use merge::ChannelPart;
 pub use merge::{LogMessage, LogReader};
 pub use paths::log_files;
-pub use summary::Statistics;
+pub use summary::FileStatistics;
 pub use supplement::SupplementKind;
 pub(crate) use supplement::{OUTCOME_RECORD, describes_its_file, read_attachment, read_metadata};
 

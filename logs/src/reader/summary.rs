@@ -25,12 +25,12 @@ pub(crate) struct SummarySection {
     pub(crate) definitions_complete: bool,
     /// The positions of the chunks, ascending.
     pub(crate) chunk_starts: Vec<usize>,
-    pub(crate) statistics: Option<Statistics>,
+    pub(crate) statistics: Option<FileStatistics>,
 }
 
 /// The statistics of a file's messages.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Statistics {
+pub struct FileStatistics {
     /// The number of messages.
     pub messages: u64,
     /// The log time of the first, nanoseconds.
@@ -99,7 +99,7 @@ fn read_channel_count(body: &[u8]) -> Option<usize> {
     usize::try_from(fields.u32()?).ok()
 }
 
-fn read_statistics(body: &[u8]) -> Option<Statistics> {
+fn read_statistics(body: &[u8]) -> Option<FileStatistics> {
     let mut fields = Fields(body);
     let messages = fields.u64()?;
     // The numbers of schemas, channels, attachments, metadata records and chunks.
@@ -109,7 +109,7 @@ fn read_statistics(body: &[u8]) -> Option<Statistics> {
     while let (Some(channel), Some(count)) = (counts.u16(), counts.u64()) {
         by_channel.insert(channel, count);
     }
-    Some(Statistics { messages, first, last, by_channel })
+    Some(FileStatistics { messages, first, last, by_channel })
 }
 
 /// The position of the chunk in an index record: after its two times.

@@ -51,7 +51,7 @@ pub enum CellValues {
 
 /// The meaning of the values of one map's cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Convention {
+pub(crate) enum CellMeaning {
     /// What map servers write.
     Occupancy,
     /// Obstacles with the costs around them.
@@ -62,7 +62,7 @@ pub(crate) enum Convention {
     TwoClasses { free: f64, occupied: f64 },
 }
 
-impl fmt::Display for Convention {
+impl fmt::Display for CellMeaning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Occupancy => f.write_str("cells are read as occupancy"),
@@ -96,13 +96,13 @@ pub(crate) fn inversion_of(cells: &[i8]) -> Option<String> {
 impl CellValues {
     /// The cells of a map in the convention of map servers, and the convention that they were in. Borrowed if they are
     /// in it.
-    pub(crate) fn read<'a>(self, info: &MapMetaData, cells: &'a [i8]) -> (Cow<'a, [i8]>, Convention) {
+    pub(crate) fn read<'a>(self, info: &MapMetaData, cells: &'a [i8]) -> (Cow<'a, [i8]>, CellMeaning) {
         let convention = self.convention(info.width as usize, cells);
         let read = match convention {
-            Convention::Occupancy => Cow::Borrowed(cells),
-            Convention::Costmap => Cow::Owned(without_costs(info.width as usize, cells)),
-            Convention::Probabilities => Cow::Owned(cells.iter().map(|value| by_probability(*value)).collect()),
-            Convention::TwoClasses { free, occupied } => {
+            CellMeaning::Occupancy => Cow::Borrowed(cells),
+            CellMeaning::Costmap => Cow::Owned(without_costs(info.width as usize, cells)),
+            CellMeaning::Probabilities => Cow::Owned(cells.iter().map(|value| by_probability(*value)).collect()),
+            CellMeaning::TwoClasses { free, occupied } => {
                 let scaled = |value: i8| {
                     let share = (f64::from(value) - free) / (occupied - free);
                     if cell::is_known(value) { (100.0 * share).round().clamp(0.0, 100.0) as i8 } else { cell::UNKNOWN }
@@ -133,18 +133,20 @@ impl CellValues {
         Some((encode(&translated).ok()?, notes.collect()))
     }
 
-    fn convention(self, width: usize, cells: &[i8]) -> Convention {
+    fn convention(self, width: usize, cells: &[i8]) -> CellMeaning {
         let classes = |classes: Option<Classes>| {
-            let between = |Classes { free, occupied, .. }| Convention::TwoClasses { free, occupied };
-            classes.map_or(Convention::Occupancy, between)
+            let between = |Classes { free, occupied, .. }| CellMeaning::TwoClasses { free, occupied };
+            classes.map_or(CellMeaning::Occupancy, between)
         };
         match self {
-            Self::Occupancy => Convention::Occupancy,
-            Self::Costmap => Convention::Costmap,
-            Self::Probabilities => Convention::Probabilities,
+            Self::Occupancy => CellMeaning::Occupancy,
+            Self::Costmap => CellMeaning::Costmap,
+            Self::Probabilities => CellMeaning::Probabilities,
             Self::TwoClasses => classes(Counts::of(cells).classes()),
             Self::Inverted => match classes(Counts::of(cells).classes()) {
-                Convention::TwoClasses { free, occupied } => Convention::TwoClasses { free: occupied, occupied: free },
+                CellMeaning::TwoClasses { free, occupied } => {
+                    CellMeaning::TwoClasses { free: occupied, occupied: free }
+                }
                 convention => convention,
             },
             Self::Auto => {
@@ -156,12 +158,12 @@ impl CellValues {
                     true if counts.of_value(INSCRIBED) >= counts.of_value(LETHAL).max(1)
                         && obstacles_are_inflated(width, cells) =>
                     {
-                        Convention::Costmap
+                        CellMeaning::Costmap
                     }
-                    true if counts.are_probabilities() => Convention::Probabilities,
-                    true => Convention::Occupancy,
+                    true if counts.are_probabilities() => CellMeaning::Probabilities,
+                    true => CellMeaning::Occupancy,
                     false => match classes(counts.two_classes()) {
-                        Convention::Occupancy if counts.are_probabilities() => Convention::Probabilities,
+                        CellMeaning::Occupancy if counts.are_probabilities() => CellMeaning::Probabilities,
                         convention => convention,
                     },
                 }
@@ -264,7 +266,7 @@ mod tests {
 
     const N: i8 = -1;
 
-    fn read(values: CellValues, width: u32, cells: &[i8]) -> (Vec<i8>, Convention) {
+    fn read(values: CellValues, width: u32, cells: &[i8]) -> (Vec<i8>, CellMeaning) {
         let info = MapMetaData { width, height: cells.len() as u32 / width, ..Default::default() };
         let (read, convention) = values.read(&info, cells);
         (read.into_owned(), convention)
@@ -273,7 +275,7 @@ mod tests {
     #[test]
     fn what_map_servers_write_is_read_as_it_is() {
         for cells in [&[0, 0, 0, 100, N][..], &[0, 3, 12, 40, 97, N], &[100, 100, N], &[0, 0, N], &[N, N], &[]] {
-            assert_eq!(read(CellValues::Auto, 1, cells), (cells.to_vec(), Convention::Occupancy), "{cells:?}");
+            assert_eq!(read(CellValues::Auto, 1, cells), (cells.to_vec(), CellMeaning::Occupancy), "{cells:?}");
         }
     }
 
@@ -283,7 +285,7 @@ mod tests {
             let cells = [N, free, free, free, occupied, free, N];
             let (read, convention) = read(CellValues::Auto, 7, &cells);
             assert_eq!(read, [N, 0, 0, 0, 100, 0, N], "{free} {occupied}");
-            let means = Convention::TwoClasses { free: f64::from(free), occupied: f64::from(occupied) };
+            let means = CellMeaning::TwoClasses { free: f64::from(free), occupied: f64::from(occupied) };
             assert_eq!(convention, means);
         }
     }
@@ -306,14 +308,14 @@ mod tests {
             [[0; 2], [0; 2], [0; 2], [0; 2], [60; 2], [50, N], [100, 60]].concat(),
         ] {
             let (read, convention) = read(CellValues::Auto, 14, &cells);
-            assert_eq!(convention, Convention::Probabilities);
+            assert_eq!(convention, CellMeaning::Probabilities);
             assert_eq!(read, [0, 0, 0, 0, 0, 0, 0, 0, 100, 100, N, N, 100, 100]);
         }
         let sure = [0, 0, 0, 30, 50, 50, 50, 50, 100, 100, 60, N];
-        assert_eq!(read(CellValues::Auto, 12, &sure).1, Convention::Occupancy, "50 is unknown");
+        assert_eq!(read(CellValues::Auto, 12, &sure).1, CellMeaning::Occupancy, "50 is unknown");
         // What the user demands is done.
         let spread: Vec<i8> = (30..60).collect();
-        assert!(matches!(read(CellValues::TwoClasses, 30, &spread).1, Convention::TwoClasses { .. }));
+        assert!(matches!(read(CellValues::TwoClasses, 30, &spread).1, CellMeaning::TwoClasses { .. }));
     }
 
     #[test]
@@ -334,7 +336,7 @@ mod tests {
     fn values_of_one_class_are_left_as_they_are() {
         let spread: Vec<i8> = (20..50).collect();
         for cells in [&spread[..], &[0, 1, 2, 3, 2, 1, 0], &[40, 40, 41], &[1, 1, 1, 0]] {
-            assert_eq!(read(CellValues::Auto, 1, cells).1, Convention::Occupancy, "{cells:?}");
+            assert_eq!(read(CellValues::Auto, 1, cells).1, CellMeaning::Occupancy, "{cells:?}");
         }
     }
 
@@ -346,7 +348,7 @@ mod tests {
     #[test]
     fn costs_are_free_on_the_side_of_free_space_and_unknown_behind_an_obstacle() {
         let expected = [[0, 0, 0, 0, 0, 100, N, N, N, N]; 6].concat();
-        assert_eq!(read(CellValues::Auto, 10, &costmap()), (expected.clone(), Convention::Costmap));
+        assert_eq!(read(CellValues::Auto, 10, &costmap()), (expected.clone(), CellMeaning::Costmap));
         assert_eq!(read(CellValues::Costmap, 10, &costmap()).0, expected);
         assert_eq!(read(CellValues::Occupancy, 10, &costmap()).0, costmap());
         assert_eq!(read(CellValues::Costmap, 2, &[0, -128]).0, [0, N], "every value out of range is unknown");
@@ -356,7 +358,7 @@ mod tests {
     fn a_map_with_values_of_99_beside_walls_here_and_there_is_no_costmap() {
         let mut cells = [[0, 0, 0, 100, 99, 0, N]; 6].concat();
         cells[0] = 99;
-        assert_eq!(read(CellValues::Auto, 7, &cells).1, Convention::Occupancy);
+        assert_eq!(read(CellValues::Auto, 7, &cells).1, CellMeaning::Occupancy);
     }
 
     proptest! {
@@ -369,7 +371,7 @@ mod tests {
             let info = MapMetaData { width, ..Default::default() };
             let (read, convention) = values.read(&info, &cells);
             prop_assert_eq!(read.len(), cells.len());
-            if convention != Convention::Occupancy {
+            if convention != CellMeaning::Occupancy {
                 for (was, is) in cells.iter().zip(read.iter()) {
                     prop_assert!(*is == cell::UNKNOWN || cell::is_known(*is));
                     prop_assert!(cell::is_known(*was) || *is == cell::UNKNOWN);

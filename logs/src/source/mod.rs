@@ -21,7 +21,7 @@ pub use live_router::{LiveMessage, LiveRouter};
 pub use stage::McapSource;
 
 use crate::map_file::Thresholds;
-use crate::names::{Convention, Input, NameRules};
+use crate::names::{Input, NameRules, TopicNaming};
 use crate::robots::problem_of_resolutions;
 use gridweave_runtime::ros::{
     OccupancyGrid, PoseWithCovarianceStamped, RangeScan, TagBearing, TagPosition, TagRange, TopologicalMap,
@@ -42,7 +42,7 @@ pub struct SourceParameters {
     /// the topics and frames of a log under the name of a robot. Set by `--input` on the command line.
     pub files: Vec<PathBuf>,
     /// How topics and frames are named: under their robots, or as they were logged.
-    pub names: Convention,
+    pub names: TopicNaming,
     /// Topics to rename, as `OLD=NEW`, with or without the name of their robot. `{robot}` matches one part of both.
     pub rename: Vec<String>,
     /// The robots to read; the topics of others are ignored. Empty for all.

@@ -3,7 +3,7 @@
 use super::latched::{LatchedMessages, Window};
 use super::router::Router;
 use super::{RobotMessages, RobotReading, SourceParameters};
-use crate::names::{self, Convention};
+use crate::names::{self, TopicNaming};
 use crate::reader::{LogFile, LogReader};
 use crate::robots::CellValues;
 use gridweave_runtime::message::LogTime;
@@ -47,7 +47,7 @@ impl McapSource {
         let opened = names::open(&parameters.inputs(), &rules, &context.robots);
         let (reader, names) = opened.map_err(|error| StageError::new(doing, error))?;
         let origin = reader.files().iter().filter_map(LogFile::first_time).min().map_or(LogTime::MIN, LogTime);
-        let names_robots = rules.convention == Convention::ByRobot;
+        let names_robots = rules.convention == TopicNaming::ByRobot;
         // What keeps the names of the log keeps its bytes.
         let map_values = if names_robots { parameters.map_values } else { CellValues::Occupancy };
         let given: Vec<String> = parameters.lidars.keys().cloned().collect();

@@ -63,10 +63,10 @@ pub struct DeformationSummary {
     pub wall_matched_m: f64,
     /// The sharpness of the walls in common with other maps, by the rigid frames alone.
     #[serde(default)]
-    pub sharpness_rigid: Sharpness,
+    pub sharpness_rigid: WallSharpness,
     /// The same, with the deformations.
     #[serde(default)]
-    pub sharpness: Sharpness,
+    pub sharpness: WallSharpness,
     /// The estimated strength of the deformation: standard deviation of the relative displacement of two points, metres
     /// per square root of the distance between them in metres; `None` if unknown.
     #[serde(default)]
@@ -101,14 +101,14 @@ impl From<&MapDeformation> for DeformationSummary {
 
 /// The sharpness of walls that several maps contain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Sharpness {
+pub struct WallSharpness {
     /// The wall thickness spread: the mean distance between the copies of a wall, perpendicular to the wall, metres.
     pub apart_m: f64,
     /// The double-wall ratio: the share of the walls whose copies appear as two walls, 0 to 1.
     pub doubled: f64,
 }
 
-impl From<ros::Sharpness> for Sharpness {
+impl From<ros::Sharpness> for WallSharpness {
     fn from(message: ros::Sharpness) -> Self {
         Self { apart_m: message.apart, doubled: message.doubled }
     }

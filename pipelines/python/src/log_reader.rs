@@ -1,7 +1,7 @@
 //! Iteration over the messages of logs.
 
 use crate::errors::GridweaveError;
-use gridweave_logs::names::{self, Convention, Input, NameRules, Names};
+use gridweave_logs::names::{self, Input, NameRules, Names, TopicNaming};
 use gridweave_logs::reader::{LogFile, LogReader};
 use gridweave_runtime::stage::RobotTopics;
 use pyo3::prelude::*;
@@ -24,7 +24,7 @@ impl LogMessages {
     #[new]
     fn new(py: Python<'_>, files: Vec<PathBuf>) -> PyResult<Self> {
         let inputs: Vec<Input> = files.iter().map(|file| Input::new(file)).collect();
-        let rules = NameRules { convention: Convention::AsLogged, ..NameRules::default() };
+        let rules = NameRules { convention: TopicNaming::AsLogged, ..NameRules::default() };
         let opened = py.detach(|| names::open(&inputs, &rules, &RobotTopics::default()));
         let (reader, names) = opened.map_err(|error| GridweaveError::new_err(error.to_string()))?;
         Ok(Self { reader, names })

@@ -6,7 +6,7 @@ use crate::terminal::{eprint_line, print};
 use anyhow::Result;
 use clap::Args;
 use gridweave_logs::dynamic::{JsonOptions, Schema};
-use gridweave_logs::names::{self, Convention, Input};
+use gridweave_logs::names::{self, Input, TopicNaming};
 use gridweave_logs::reader::LogFile;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::stage::RobotTopics;
@@ -37,7 +37,7 @@ const PART: usize = 1 << 16;
 /// Prints messages.
 pub(crate) fn cat(args: &CatArgs) -> Result<Status> {
     let inputs: Vec<Input> = args.inputs.iter().map(|input| Input::new(input)).collect();
-    let rules = args.reading.names.rules(Convention::AsLogged)?;
+    let rules = args.reading.names.rules(TopicNaming::AsLogged)?;
     let (mut reader, names) = names::open(&inputs, &rules, &RobotTopics::default())?;
     let files = reader.files().clone();
     let origin = files.iter().filter_map(LogFile::first_time).min().map_or(LogTime::MIN, LogTime);

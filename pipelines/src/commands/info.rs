@@ -10,7 +10,7 @@ use crate::text_wrapping::wrap;
 use anyhow::Result;
 use clap::Args;
 use gridweave_logs::info::{self, FileInfo, LogInfo, TopicInfo};
-use gridweave_logs::names::{Convention, Input};
+use gridweave_logs::names::{Input, TopicNaming};
 use gridweave_logs::sink::InputFile;
 use gridweave_runtime::pipeline::Overrides;
 use gridweave_runtime::stage::Registry;
@@ -54,7 +54,7 @@ pub(crate) fn info(args: &InfoArgs, registry: &Registry) -> Result<Status> {
     };
     let inputs: Vec<Input> = args.inputs.iter().map(|input| Input::new(input)).collect();
     let inspect = if args.all { info::inspect } else { info::glance };
-    let found = inspect(&inputs, &args.names.rules(Convention::ByRobot)?, &robots)?;
+    let found = inspect(&inputs, &args.names.rules(TopicNaming::ByRobot)?, &robots)?;
     match args.json {
         true => print_line(serde_json::to_string_pretty(&found)?),
         false => print(to_text(&found, width())),

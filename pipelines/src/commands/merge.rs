@@ -8,7 +8,7 @@ use crate::terminal::eprint_line;
 use anyhow::Result;
 use clap::Args;
 use gridweave_logs::info;
-use gridweave_logs::names::{Convention, Input};
+use gridweave_logs::names::{Input, TopicNaming};
 use gridweave_runtime::stage::{Registry, RobotTopics};
 use std::path::{Path, PathBuf};
 
@@ -66,14 +66,14 @@ fn has_only_tags(args: &MergeArgs) -> Result<bool, BadUse> {
         return Ok(false);
     }
     let inputs: Vec<Input> = args.inputs.iter().map(|input| Input::new(input)).collect();
-    let rules = args.options.reading.names.rules(Convention::ByRobot)?;
+    let rules = args.options.reading.names.rules(TopicNaming::ByRobot)?;
     Ok(info::holds_tags_alone(&inputs, &rules, &RobotTopics::default()).unwrap_or(false))
 }
 
 /// Finds the robots that have scans and no map. Logs that cannot be read are errors of the run.
 fn robots_without_maps(args: &MergeArgs) -> Result<Vec<String>, BadUse> {
     let inputs: Vec<Input> = args.inputs.iter().map(|input| Input::new(input)).collect();
-    let rules = args.options.reading.names.rules(Convention::ByRobot)?;
+    let rules = args.options.reading.names.rules(TopicNaming::ByRobot)?;
     Ok(info::robots_with_scans_only(&inputs, &rules, &RobotTopics::default()).unwrap_or_default())
 }
 

@@ -2,7 +2,7 @@
 
 use crate::status::BadUse;
 use clap::Args;
-use gridweave_logs::names::{Convention, NameRules};
+use gridweave_logs::names::{NameRules, TopicNaming};
 use gridweave_runtime::pipeline::Overrides;
 
 /// The kind of stage that reads logs.
@@ -65,7 +65,7 @@ impl NamingOptions {
     ///
     /// # Errors
     /// An entry of `--rename` is not of the form OLD=NEW.
-    pub(crate) fn rules(&self, convention: Convention) -> Result<NameRules, BadUse> {
+    pub(crate) fn rules(&self, convention: TopicNaming) -> Result<NameRules, BadUse> {
         let renames = self.rename.iter().map(|text| text.parse()).collect::<Result<_, _>>().map_err(BadUse)?;
         let (robots, topics) = (self.robots.clone(), self.topics.clone());
         Ok(NameRules { convention, renames, robots, topics, align_start: self.align_start, ..Default::default() })

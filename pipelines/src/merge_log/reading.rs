@@ -4,7 +4,7 @@ use super::MergeState;
 use crate::job::NamingOptions;
 use anyhow::Result;
 use gridweave_logs::map_file::{Thresholds, load_as};
-use gridweave_logs::names::{self, Convention, Input, Names};
+use gridweave_logs::names::{self, Input, Names, TopicNaming};
 use gridweave_logs::reader::{LogMessage, LogReader};
 use gridweave_runtime::message::{Channel, LogTime};
 use gridweave_runtime::ros::{Header, OccupancyGrid, encode};
@@ -35,7 +35,7 @@ impl Opened {
     pub(crate) fn new(logs: &[PathBuf], naming: &NamingOptions) -> Result<Self> {
         let inputs: Vec<Input> = logs.iter().map(|input| Input::new(input)).collect();
         let topics = RobotTopics::default();
-        let (reader, names) = names::open(&inputs, &naming.rules(Convention::ByRobot)?, &topics)?;
+        let (reader, names) = names::open(&inputs, &naming.rules(TopicNaming::ByRobot)?, &topics)?;
         let problems = reader.files().iter().flat_map(|file| file.damage()).map(ToString::to_string).collect();
         let state = MergeState::default();
         Ok(Self { reader, names, topics, start: None, pending: None, state, problems })

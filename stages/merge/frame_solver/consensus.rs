@@ -25,7 +25,7 @@ use std::collections::BTreeMap;
 const WITNESSES: usize = 8;
 
 /// A set of edges that agree with each other.
-pub(super) struct Consensus<'a> {
+pub(super) struct EdgeConsensus<'a> {
     robots: usize,
     edges: &'a [Edge],
     neighbours: &'a Neighbours,
@@ -42,7 +42,7 @@ struct Relocation {
     cut: Option<LeastCut>,
 }
 
-impl<'a> Consensus<'a> {
+impl<'a> EdgeConsensus<'a> {
     /// Finds a set that no relocation enlarges, from edges that are known to agree. A cycle is closed if its Mahalanobis
     /// distance from the identity is within `gate`.
     pub(super) fn find(
@@ -169,8 +169,8 @@ struct Relocations<'a> {
 
 impl<'a> Relocations<'a> {
     /// Relocations over those edges of the set for which `used` holds. The poses are those of the whole set.
-    fn new(consensus: &Consensus<'a>, used: impl Fn(usize) -> bool) -> Self {
-        let Consensus { robots, edges, gate, .. } = *consensus;
+    fn new(consensus: &EdgeConsensus<'a>, used: impl Fn(usize) -> bool) -> Self {
+        let EdgeConsensus { robots, edges, gate, .. } = *consensus;
         let forest = Forest::grow(robots, edges, 0, |index| consensus.agrees[index]);
         let placed = forest.poses_by_tree(edges);
         let in_use = edges.iter().enumerate().filter(|(index, _)| used(*index));

@@ -14,7 +14,7 @@
 //! Scores are not used: those of different methods are not comparable. Nor are small covariances evidence for an
 //! alignment: they are its accuracy if it is right, not the probability that it is.
 
-use super::consensus::Consensus;
+use super::consensus::EdgeConsensus;
 use super::graph::{Cycle, Edge, Forest, Neighbours};
 use super::search::{Search, count_disjoint};
 use std::collections::{BTreeMap, BTreeSet};
@@ -95,7 +95,7 @@ fn judge_by_moves(
     let own: Vec<Edge> = group.iter().map(|&index| edges[index]).collect();
     let known = group.iter().map(|&index| known[index]).collect();
     let neighbours = Neighbours::new(robots, &own);
-    let consensus = Consensus::find(robots, &own, &neighbours, known, gate);
+    let consensus = EdgeConsensus::find(robots, &own, &neighbours, known, gate);
     let disputed = consensus.disputed();
     let is_right = |index: usize| consensus.contains(index) && !disputed.contains_key(&index);
     let in_all_edges = |cycle: Cycle| Cycle {

@@ -198,7 +198,7 @@ fn range_within(start: f64, step: f64, (low, high): (f64, f64), count: usize) ->
 
 #[cfg(test)]
 mod tests {
-    use super::super::layout::{Lattice, layout_of};
+    use super::super::layout::{CellLattice, layout_of};
     use super::*;
     use crate::shared::geometry::{Pose2, is_free, is_occupied, pose};
     use proptest::prelude::*;
@@ -213,7 +213,7 @@ mod tests {
         let maps: Vec<_> = maps.iter().copied().zip(&areas).collect();
         let anchor = Point2::from(maps[0].0.transform_world_grid().translation.vector);
         let resolution = maps.iter().map(|(map, _)| map.grid.geometry.resolution).fold(f64::INFINITY, f64::min);
-        let lattice = Lattice { anchor, resolution, max_extent: 100.0, max_cells: 1_000_000 };
+        let lattice = CellLattice { anchor, resolution, max_extent: 100.0, max_cells: 1_000_000 };
         let geometry = layout_of(&maps, &lattice).geometry.unwrap();
         let (mut cells, mut conflicts) = (vec![0; geometry.cell_count()], vec![0; geometry.cell_count()]);
         let fused = Fused { cells: &mut cells, conflicts: &mut conflicts };

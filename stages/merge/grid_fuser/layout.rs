@@ -12,7 +12,7 @@ struct Extent {
 
 /// The lattice of the fused grid's cells, and its limits.
 #[derive(Clone, Copy, Debug)]
-pub struct Lattice {
+pub struct CellLattice {
     /// A corner of a cell, metres in the world: that of the reference robot's map, so that its cells coincide with
     /// cells of the fused map.
     pub anchor: Point2,
@@ -55,7 +55,7 @@ const DOUBT: &str = "does the origin of each map fit the poses of its robot?";
 
 /// Computes the fused grid of the given maps, earlier maps first: a map that does not fit those before it is left
 /// out.
-pub fn layout_of(maps: &[(PlacedGrid<'_>, &KnownArea)], lattice: &Lattice) -> Layout {
+pub fn layout_of(maps: &[(PlacedGrid<'_>, &KnownArea)], lattice: &CellLattice) -> Layout {
     let mut layout = Layout { geometry: None, takes_part: Vec::with_capacity(maps.len()) };
     let (mut whole, mut known): (Option<Extent>, f64) = (None, 0.0);
     for (map, area) in maps {
@@ -73,7 +73,7 @@ pub fn layout_of(maps: &[(PlacedGrid<'_>, &KnownArea)], lattice: &Lattice) -> La
 }
 
 /// Bounding rectangle of the known part of a map, if there is any.
-fn extent(map: &PlacedGrid<'_>, area: &KnownArea, lattice: &Lattice) -> Result<Option<Extent>, LeftOut> {
+fn extent(map: &PlacedGrid<'_>, area: &KnownArea, lattice: &CellLattice) -> Result<Option<Extent>, LeftOut> {
     let mut extent: Option<Extent> = None;
     for corner in area.corners() {
         let in_cells = Point2::from((map.in_world(&corner) - lattice.anchor) / lattice.resolution);
@@ -92,7 +92,7 @@ impl Extent {
     }
 }
 
-impl Lattice {
+impl CellLattice {
     /// The grid of the cells whose centres are within the extent, about `known` of which are known.
     fn geometry(&self, extent: &Extent, known: f64) -> Result<GridGeometry, LeftOut> {
         let (left, width) = self.cells(extent.low.x, extent.high.x)?;
@@ -128,8 +128,8 @@ mod tests {
     use crate::shared::geometry::{Cell, Grid, Pose2};
     use proptest::prelude::*;
 
-    const LATTICE: Lattice =
-        Lattice { anchor: Point2::new(-1.3, 2.7), resolution: 0.05, max_extent: 100.0, max_cells: 1_000_000 };
+    const LATTICE: CellLattice =
+        CellLattice { anchor: Point2::new(-1.3, 2.7), resolution: 0.05, max_extent: 100.0, max_cells: 1_000_000 };
 
     fn geometry(width: usize, height: usize) -> GridGeometry {
         GridGeometry { width, height, resolution: 0.05, origin: pose(-1.3, 2.7, 0.0) }
@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn the_largest_grid_depends_on_the_known_area_and_not_on_the_distance() {
-        let lattice = Lattice { max_extent: 1e6, max_cells: 100_000_000, ..LATTICE };
+        let lattice = CellLattice { max_extent: 1e6, max_cells: 100_000_000, ..LATTICE };
         let known = vec![0; 6 * 4];
         let (grid, area) = (grid(&known), KnownArea::of(&grid(&known)));
         let at = |x: f64, y: f64| (PlacedGrid::rigid(grid, pose(x, y, 0.0)), &area);

@@ -2,7 +2,7 @@
 
 use super::agreement::CellCounts;
 use super::evidence::EvidenceTable;
-use super::layout::{Lattice, layout_of};
+use super::layout::{CellLattice, layout_of};
 use super::{Fused, GridFuserParameters, KnownArea, PlacedGrid, Warp, forward, inverse};
 use crate::shared::geometry::Point2;
 use crate::shared::placement::Placement;
@@ -156,7 +156,7 @@ impl GridFuser {
 
         let finest = maps.iter().map(|(map, _)| map.grid.geometry.resolution).min_by(f64::total_cmp);
         let Some(resolution) = self.parameters.resolution.or(finest) else { return Ok(()) };
-        let lattice = Lattice {
+        let lattice = CellLattice {
             anchor: anchor(&maps),
             resolution,
             max_extent: self.parameters.max_extent,

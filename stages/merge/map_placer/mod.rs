@@ -8,7 +8,7 @@ mod stage;
 pub use stage::kind;
 
 use crate::merge::grid_fuser::evidence::EvidenceTable;
-use crate::merge::grid_fuser::layout::{Lattice, layout_of};
+use crate::merge::grid_fuser::layout::{CellLattice, layout_of};
 use crate::merge::grid_fuser::{Fused, GridFuserParameters, KnownArea, PlacedGrid, inverse};
 use crate::shared::geometry::{Grid, GridGeometry};
 use crate::shared::placement::Placed;
@@ -28,7 +28,7 @@ impl<'a> PlacedMap<'a> {
         let map = (PlacedGrid { grid, transform_world_map, deformation }, area);
         let GridFuserParameters { max_extent, max_cells, .. } = Default::default();
         let anchor = map.0.transform_world_grid().translation.vector.into();
-        let lattice = Lattice { anchor, resolution: grid.geometry.resolution, max_extent, max_cells };
+        let lattice = CellLattice { anchor, resolution: grid.geometry.resolution, max_extent, max_cells };
         Some(Self { map, geometry: layout_of(&[map], &lattice).geometry? })
     }
 

@@ -16,6 +16,6 @@ mod tests;
 
 pub use initial_guess::InitialGuess;
 pub use parameters::{IcpParameters, Metric, Weighting};
-pub use refine::{Refinement, refine};
+pub use refine::{RefinedAlignment, refine};
 pub use refusal::IcpRefusal;
 pub use registration::{Registration, register};

@@ -5,14 +5,14 @@ use crate::shared::walls::WallMap;
 
 /// A refined alignment, and whether it may be used.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Refinement {
+pub struct RefinedAlignment {
     /// The registration.
     pub registration: Registration,
     /// Why the alignment may not be used; none if it may.
     pub refusal: Option<IcpRefusal>,
 }
 
-impl Refinement {
+impl RefinedAlignment {
     /// Reason for or against the alignment, for the user.
     pub fn reason(&self) -> String {
         match &self.refusal {
@@ -24,8 +24,8 @@ impl Refinement {
 
 /// Refines a first guess of `T_a_b`, and checks that the walls constrain the result. Whether the maps agree there is
 /// judged by `merge_verifier`.
-pub fn refine(a: &WallMap, b: &WallMap, initial_guess: &InitialGuess, parameters: &IcpParameters) -> Refinement {
+pub fn refine(a: &WallMap, b: &WallMap, initial_guess: &InitialGuess, parameters: &IcpParameters) -> RefinedAlignment {
     let registration = register(a, b, initial_guess, parameters);
     let refusal = IcpRefusal::of(&registration, parameters);
-    Refinement { registration, refusal }
+    RefinedAlignment { registration, refusal }
 }

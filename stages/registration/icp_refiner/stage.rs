@@ -2,7 +2,7 @@
 //! guesses change.
 
 use crate::registration::hypotheses::{HypothesisGatherer, Origin, has_covariance_of_fit};
-use crate::registration::icp::{IcpParameters, IcpRefusal, InitialGuess, Refinement, refine};
+use crate::registration::icp::{IcpParameters, IcpRefusal, InitialGuess, RefinedAlignment, refine};
 use crate::shared::geometry::{row_by_row, wrap_angle};
 use crate::shared::robot_maps::RobotMaps;
 use crate::shared::walls::WallsOnDemand;
@@ -51,7 +51,7 @@ struct Refined {
     /// Numbers of the two maps.
     maps: (u64, u64),
     first_guess: Alignment,
-    refinement: Refinement,
+    refinement: RefinedAlignment,
 }
 
 impl IcpRefiner {
@@ -207,7 +207,7 @@ impl Refined {
 
     /// The message with the refined alignment. The reason of the first guess is part of its reason.
     fn alignment(&self, first_guess: &Alignment, log_time: LogTime) -> Alignment {
-        let Refinement { registration, refusal } = &self.refinement;
+        let RefinedAlignment { registration, refusal } = &self.refinement;
         let mut alignment = Alignment {
             header: Header::new(log_time, first_guess.header.frame_id.clone()),
             covariance: row_by_row(&registration.covariance),

@@ -1,6 +1,6 @@
 use super::*;
 use crate::shared::geometry::PointIndex;
-use crate::simulator::free_space::FreeSpace;
+use crate::simulator::clearances::Clearances;
 use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -27,7 +27,7 @@ proptest! {
     fn every_room_and_corridor_can_be_reached(size in size(), seed: u64) {
         let plan = FloorPlan::random(&size, &mut ChaCha8Rng::seed_from_u64(seed));
         prop_assert!(plan.rooms.len() >= 2);
-        let space = FreeSpace::of(&plan);
+        let space = Clearances::of(&plan);
         for area in plan.rooms.iter().map(|room| &room.bounds).chain(&plan.corridors) {
             let places = space.places_in(area).len();
             let cells = area.expanded(-0.3).width() * area.expanded(-0.3).height() / 0.01;
@@ -38,7 +38,7 @@ proptest! {
     #[test]
     fn the_building_is_closed_and_its_rooms_do_not_overlap(size in size(), seed: u64) {
         let plan = FloorPlan::random(&size, &mut ChaCha8Rng::seed_from_u64(seed));
-        let space = FreeSpace::new(&plan.bounds.expanded(1.0), &plan.solids, &plan.corridors[0].centre());
+        let space = Clearances::new(&plan.bounds.expanded(1.0), &plan.solids, &plan.corridors[0].centre());
         for place in space.places_in(&plan.bounds.expanded(2.0)) {
             prop_assert!(plan.bounds.contains(&place), "{place} is outside");
         }
@@ -63,7 +63,7 @@ fn a_symmetric_building_is_the_same_after_half_a_turn() {
     };
     for seed in 0..5 {
         let plan = FloorPlan::random(&size, &mut ChaCha8Rng::seed_from_u64(seed));
-        let space = FreeSpace::of(&plan);
+        let space = Clearances::of(&plan);
         let places = space.places_in(&plan.bounds);
         let turned: Vec<Point2> = places.iter().map(|place| Point2::new(20.0 - place.x, 15.0 - place.y)).collect();
         let (turned, _) = PointIndex::new(&turned, 0.2);

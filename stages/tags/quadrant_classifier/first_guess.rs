@@ -3,9 +3,10 @@
 use super::direction::Direction;
 use super::parameters::{QuadrantClassifierParameters, RotationFrom};
 use super::rotation_by_directions::{MissingDirection, rotation_by_directions};
-use super::tag_rotation::{TagPair, TagRotation, tag_rotation};
+use super::tag_rotation::{TagRotation, tag_pair, tag_rotation};
 use super::translation::{residual, translate};
 use crate::shared::geometry::{Pose2, turn_difference, wrap_angle};
+use crate::tags::tag_filter::TagPair;
 use gridweave_runtime::ros::CommonTag;
 use nalgebra::Matrix3;
 use std::f64::consts::TAU;
@@ -154,7 +155,7 @@ fn expected_residual(tags: &[CommonTag]) -> f64 {
 }
 
 pub(super) fn tag_pairs(tags: &[CommonTag], parameters: &QuadrantClassifierParameters) -> Vec<TagPair> {
-    tags.iter().filter_map(|tag| TagPair::new(tag, parameters.tag_deviation)).collect()
+    tags.iter().filter_map(|tag| tag_pair(tag, parameters.tag_deviation)).collect()
 }
 
 /// `d_theta + kappa * 90 degrees`, or why the rotation must be that of the tags.

@@ -2,46 +2,27 @@
 
 use super::parameters::TagRotationFrom;
 use crate::shared::geometry::{Point2, PointPair, fit_rigid, wrap_angle};
+use crate::tags::tag_filter::TagPair;
 use gridweave_runtime::ros::CommonTag;
 use nalgebra::Matrix2;
-
-/// A validated tag in both maps.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct TagPair {
-    /// Position in map a, metres.
-    pub(super) a: Point2,
-    /// Position in map b, metres.
-    pub(super) b: Point2,
-    /// Covariance in map a, square metres.
-    pub(super) covariance_a: Matrix2<f64>,
-    /// Covariance in map b, square metres.
-    pub(super) covariance_b: Matrix2<f64>,
-}
 
 /// Largest valid coordinate, metres; it keeps squares finite.
 const MAX_COORDINATE: f64 = 1e7;
 /// Largest valid variance, square metres.
 const MAX_VARIANCE: f64 = 1e4;
 
-impl TagPair {
-    /// The pair of a common tag. `None` if its position is invalid. `deviation`, metres, is added to the covariances
-    /// of the estimates; an invalid covariance counts as zero.
-    pub(super) fn new(tag: &CommonTag, deviation: f64) -> Option<Self> {
-        let usable = tag.a.iter().chain(&tag.b).all(|value| value.abs() <= MAX_COORDINATE);
-        let floor = Matrix2::identity() * deviation * deviation;
-        let covariance = |values: &[f64; 4]| floor + believable(values).unwrap_or_else(Matrix2::zeros);
-        usable.then(|| Self {
-            a: Point2::from(tag.a),
-            b: Point2::from(tag.b),
-            covariance_a: covariance(&tag.covariance_a),
-            covariance_b: covariance(&tag.covariance_b),
-        })
-    }
-
-    /// Variance along one axis of the distance between the two positions, square metres, for any rotation.
-    fn variance(&self) -> f64 {
-        (self.covariance_a.trace() + self.covariance_b.trace()) / 2.0
-    }
+/// The pair of a common tag. `None` if its position is invalid. `deviation`, metres, is added to the covariances of the
+/// estimates; an invalid covariance counts as zero.
+pub(super) fn tag_pair(tag: &CommonTag, deviation: f64) -> Option<TagPair> {
+    let usable = tag.a.iter().chain(&tag.b).all(|value| value.abs() <= MAX_COORDINATE);
+    let floor = Matrix2::identity() * deviation * deviation;
+    let covariance = |values: &[f64; 4]| floor + believable(values).unwrap_or_else(Matrix2::zeros);
+    usable.then(|| TagPair {
+        a: Point2::from(tag.a),
+        b: Point2::from(tag.b),
+        covariance_a: covariance(&tag.covariance_a),
+        covariance_b: covariance(&tag.covariance_b),
+    })
 }
 
 /// A valid covariance: symmetric, positive semi-definite and not too large.
@@ -131,12 +112,12 @@ mod tests {
     #[test]
     fn an_invalid_position_is_left_out_and_an_invalid_covariance_is_replaced() {
         let good = CommonTag { covariance_a: [0.01, 0.0, 0.0, 0.01], ..Default::default() };
-        assert!(TagPair::new(&CommonTag { a: [f64::NAN, 0.0], ..good.clone() }, 0.03).is_none());
-        assert!(TagPair::new(&CommonTag { b: [0.0, 1e300], ..good.clone() }, 0.03).is_none());
-        assert!((TagPair::new(&good, 0.03).unwrap().covariance_a[(0, 0)] - 0.0109).abs() < 1e-12);
+        assert!(tag_pair(&CommonTag { a: [f64::NAN, 0.0], ..good.clone() }, 0.03).is_none());
+        assert!(tag_pair(&CommonTag { b: [0.0, 1e300], ..good.clone() }, 0.03).is_none());
+        assert!((tag_pair(&good, 0.03).unwrap().covariance_a[(0, 0)] - 0.0109).abs() < 1e-12);
         for covariance_a in [[f64::NAN; 4], [-1.0, 0.0, 0.0, 1.0], [0.1, 5.0, 5.0, 0.1], [f64::INFINITY, 0.0, 0.0, 1.0]]
         {
-            let pair = TagPair::new(&CommonTag { covariance_a, ..good.clone() }, 0.03).unwrap();
+            let pair = tag_pair(&CommonTag { covariance_a, ..good.clone() }, 0.03).unwrap();
             assert!((pair.covariance_a[(0, 0)] - 0.0009).abs() < 1e-12);
         }
     }

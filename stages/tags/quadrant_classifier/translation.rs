@@ -1,13 +1,14 @@
 //! The translation between two maps whose rotation is known (section 4.2, equation 8 of Tsardoulias et al.).
 
 use super::parameters::TranslationFrom;
-use super::tag_rotation::{TagPair, TagRotation};
+use super::tag_rotation::TagRotation;
 use crate::shared::geometry::{Pose2, quarter_turn};
+use crate::tags::tag_filter::TagPair;
 use nalgebra::{Isometry2, Matrix2, Matrix3, Rotation2, Vector2};
 
 /// A transform and its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Transform {
+pub(super) struct EstimatedTransform {
     /// `T_a_b`.
     pub(super) transform_a_b: Pose2,
     /// Covariance of (x, y, yaw), metres and radians.
@@ -18,7 +19,7 @@ pub(super) struct Transform {
 ///
 /// The translation is a weighted mean over the tags, `sum A_i (a_i - R b_i)` with the A_i summing to one: the inverse
 /// covariances, the best tag only (equation 8), or thirds. `None` without tags.
-pub(super) fn translate(tags: &[TagPair], rotation: &TagRotation, from: TranslationFrom) -> Option<Transform> {
+pub(super) fn translate(tags: &[TagPair], rotation: &TagRotation, from: TranslationFrom) -> Option<EstimatedTransform> {
     let turn = Rotation2::new(rotation.angle);
     let matrix = *turn.matrix();
     let covariance = |tag: &TagPair| tag.covariance_a + matrix * tag.covariance_b * matrix.transpose();
@@ -62,7 +63,7 @@ pub(super) fn translate(tags: &[TagPair], rotation: &TagRotation, from: Translat
     );
     let finite = translation.iter().chain(full.iter()).all(|value| value.is_finite());
     (finite && !used.is_empty())
-        .then(|| Transform { transform_a_b: Isometry2::new(translation, rotation.angle), covariance: full })
+        .then(|| EstimatedTransform { transform_a_b: Isometry2::new(translation, rotation.angle), covariance: full })
 }
 
 /// Root mean square of the residuals of the tags under a transform, metres.

@@ -78,7 +78,7 @@ impl TagPair {
 
 /// Tags that agree on a transform.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Consensus {
+pub struct TagConsensus {
     /// Indices of the tags, rising.
     pub members: Vec<usize>,
     /// The transform that fits them best.
@@ -91,9 +91,9 @@ pub struct Consensus {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ConsensusSearch {
     /// The set with the most tags; of equals the one that fits best.
-    pub best: Option<Consensus>,
+    pub best: Option<TagConsensus>,
     /// The largest set on another transform, one that moves some tag of the two sets by more than the rival distance.
-    pub rival: Option<Consensus>,
+    pub rival: Option<TagConsensus>,
 }
 
 /// Finds the largest set of tags whose positions agree under one rigid transform, each within `gate` standard
@@ -104,7 +104,7 @@ pub struct ConsensusSearch {
 /// converge to it. Two transforms are different when they move a tag by more than `rival_distance` metres.
 pub fn find_consensus(pairs: &[TagPair], gate: f64, rival_distance: f64) -> ConsensusSearch {
     let seeds = pairs.len().min(MOST_SEEDS);
-    let mut found: BTreeMap<Vec<usize>, Consensus> = BTreeMap::new();
+    let mut found: BTreeMap<Vec<usize>, TagConsensus> = BTreeMap::new();
     for second in 1..seeds {
         for first in 0..second {
             if lengths_may_agree(&pairs[first], &pairs[second], gate)
@@ -114,13 +114,13 @@ pub fn find_consensus(pairs: &[TagPair], gate: f64, rival_distance: f64) -> Cons
             }
         }
     }
-    let rank = |one: &&Consensus, other: &&Consensus| {
+    let rank = |one: &&TagConsensus, other: &&TagConsensus| {
         let size = one.members.len().cmp(&other.members.len());
         size.then(other.cost.total_cmp(&one.cost)).then_with(|| other.members.cmp(&one.members))
     };
     let best = found.values().max_by(rank).cloned();
     let rival = best.as_ref().and_then(|best| {
-        let differs = |other: &&Consensus| {
+        let differs = |other: &&TagConsensus| {
             let members = best.members.iter().chain(&other.members);
             let separation = |index: &usize| {
                 let b = pairs[*index].b;
@@ -144,7 +144,7 @@ fn lengths_may_agree(one: &TagPair, other: &TagPair, gate: f64) -> bool {
 }
 
 /// Fits the transform of two tags to all that agree with it, until the set is stable.
-fn settle(pairs: &[TagPair], first: usize, second: usize, gate: f64) -> Option<Consensus> {
+fn settle(pairs: &[TagPair], first: usize, second: usize, gate: f64) -> Option<TagConsensus> {
     let mut members = vec![first, second];
     let mut fit = fit_members(pairs, &members)?;
     let mut next = agreeing(pairs, gate, |pair| pair.mahalanobis_squared(&fit, &fit.point_covariance(&pair.b)));
@@ -157,7 +157,7 @@ fn settle(pairs: &[TagPair], first: usize, second: usize, gate: f64) -> Option<C
         next = agreeing(pairs, gate, |pair| pair.mahalanobis_squared(&fit, &Matrix2::zeros()));
     }
     let cost = members.iter().map(|&index| pairs[index].mahalanobis_squared(&fit, &Matrix2::zeros())).sum();
-    Some(Consensus { members, fit, cost })
+    Some(TagConsensus { members, fit, cost })
 }
 
 fn agreeing(pairs: &[TagPair], gate: f64, distance_squared: impl Fn(&TagPair) -> f64) -> Vec<usize> {

@@ -3,7 +3,7 @@
 use super::common::is_usable;
 use super::drift::of_deformed_maps;
 use super::refusal::{AgreeingTags, ByChance, TagIds, TagRefusal};
-use super::{Consensus, TagFilterParameters, TagPair, chance_of_agreement, common_tags, find_consensus};
+use super::{TagConsensus, TagFilterParameters, TagPair, chance_of_agreement, common_tags, find_consensus};
 use crate::shared::geometry::RigidFit;
 use gridweave_runtime::ros::{CommonTag, TagEstimate};
 use std::collections::BTreeSet;
@@ -13,7 +13,7 @@ const LEAST_AGREEING_WITH_DRIFT: usize = 3;
 
 /// Verdict on the tags that two robots have in common.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Judgement {
+pub struct TagJudgement {
     /// If accepted, the tags that agree; otherwise all that are certain in both maps. By falling common precision and
     /// then by id.
     pub tags: Vec<CommonTag>,
@@ -47,7 +47,7 @@ pub struct RobotTags<'a> {
 /// Two tags always agree on some transform, if their distance is the same in both maps. That may be chance, as may be
 /// the agreement of three near each other. It suffices only if no other common tag contradicts it, and is
 /// provisional.
-pub fn judge(a: RobotTags<'_>, b: RobotTags<'_>, parameters: &TagFilterParameters) -> Judgement {
+pub fn judge(a: RobotTags<'_>, b: RobotTags<'_>, parameters: &TagFilterParameters) -> TagJudgement {
     let tags = common_tags(a.tags, b.tags, parameters.certainty);
     let outcome = enough_certain(a, b, &tags, parameters).and_then(|()| {
         let rigid = agreement(&tags, parameters).map(|agreement| (tags.clone(), agreement));
@@ -68,9 +68,11 @@ pub fn judge(a: RobotTags<'_>, b: RobotTags<'_>, parameters: &TagFilterParameter
             });
             let reason = summary(&tags, &consensus) + &doubt.unwrap_or_default();
             let members = consensus.members.iter().filter_map(|&index| tags.get(index).cloned()).collect();
-            Judgement { tags: members, accepted: true, provisional, reason, fit: Some(consensus.fit) }
+            TagJudgement { tags: members, accepted: true, provisional, reason, fit: Some(consensus.fit) }
         }
-        Err(refusal) => Judgement { tags, accepted: false, provisional: false, reason: refusal.to_string(), fit: None },
+        Err(refusal) => {
+            TagJudgement { tags, accepted: false, provisional: false, reason: refusal.to_string(), fit: None }
+        }
     }
 }
 
@@ -105,7 +107,7 @@ fn enough_certain(
 
 /// Tags that agree.
 struct TagAgreement {
-    consensus: Consensus,
+    consensus: TagConsensus,
     /// The probability of chance, if that is why they do not suffice alone.
     doubt: Option<ByChance>,
 }
@@ -154,12 +156,12 @@ fn agreement(tags: &[CommonTag], parameters: &TagFilterParameters) -> Result<Tag
     Ok(TagAgreement { consensus: best, doubt: is_provisional.then_some(ByChance(chance)) })
 }
 
-fn ids_of(consensus: &Consensus, tags: &[CommonTag]) -> TagIds {
+fn ids_of(consensus: &TagConsensus, tags: &[CommonTag]) -> TagIds {
     TagIds::of(consensus.members.iter().filter_map(|&index| tags.get(index)))
 }
 
 /// Agreement of a consensus, and the residuals of tags outside of it.
-fn summary(tags: &[CommonTag], consensus: &Consensus) -> String {
+fn summary(tags: &[CommonTag], consensus: &TagConsensus) -> String {
     let left_out: Vec<String> = tags
         .iter()
         .enumerate()

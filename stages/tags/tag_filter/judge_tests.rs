@@ -1,6 +1,6 @@
 //! Tests of whether common tags suffice.
 
-use super::{Judgement, RobotTags, TagFilterParameters, judge};
+use super::{RobotTags, TagFilterParameters, TagJudgement, judge};
 use crate::shared::geometry::{Point2, Pose2, pose};
 use gridweave_runtime::ros::TagEstimate;
 
@@ -21,7 +21,7 @@ fn tags(transform: &Pose2, places: &[(f64, f64)]) -> Vec<TagEstimate> {
     places.iter().enumerate().map(tag).collect()
 }
 
-fn judged(a: &[TagEstimate], b: &[TagEstimate]) -> Judgement {
+fn judged(a: &[TagEstimate], b: &[TagEstimate]) -> TagJudgement {
     let robot = |robot, tags| RobotTags { robot, tags };
     judge(robot("robot1", a), robot("robot2", b), &TagFilterParameters::default())
 }

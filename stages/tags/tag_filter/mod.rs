@@ -24,7 +24,7 @@ mod judge_tests;
 
 pub use chance::chance_of_agreement;
 pub use common::common_tags;
-pub use consensus::{Consensus, ConsensusSearch, TagPair, find_consensus};
-pub use judge::{Judgement, RobotTags, judge};
+pub use consensus::{ConsensusSearch, TagConsensus, TagPair, find_consensus};
+pub use judge::{RobotTags, TagJudgement, judge};
 pub use parameters::TagFilterParameters;
 pub use stage::kind;

@@ -1,6 +1,6 @@
 //! The stage `tag_filter`.
 
-use super::{Judgement, RobotTags, TagFilterParameters, judge};
+use super::{RobotTags, TagFilterParameters, TagJudgement, judge};
 use crate::shared::robot_pair::RobotPair;
 use gridweave_runtime::ros::{CommonTag, CommonTags, Header, TagEstimates};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError, StageKind};
@@ -24,8 +24,8 @@ struct TagFilter {
     parameters: TagFilterParameters,
     /// Latest estimates of each robot.
     robots: BTreeMap<String, TagEstimates>,
-    /// Judgement sent last for each pair.
-    sent: BTreeMap<RobotPair, Judgement>,
+    /// The judgement sent last for each pair.
+    sent: BTreeMap<RobotPair, TagJudgement>,
 }
 
 struct Pairs {
@@ -95,7 +95,7 @@ impl TagFilter {
 }
 
 /// Whether two judgements are equal or, if both are accepted alike, have the same tags within `min_change` metres.
-fn is_same(sent: &Judgement, judgement: &Judgement, min_change: f64) -> bool {
+fn is_same(sent: &TagJudgement, judgement: &TagJudgement, min_change: f64) -> bool {
     let near = |one: &[f64; 2], other: &[f64; 2]| (one[0] - other[0]).hypot(one[1] - other[1]) <= min_change;
     let same_tags = sent.tags.len() == judgement.tags.len()
         && sent.tags.iter().all(|one| {

@@ -7,7 +7,7 @@ use gridweave_runtime::ros::{Point, TopologicalNode, TopologicalPath};
 
 /// Nodes of a map and the paths between them.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Topology {
+pub struct ExtractedTopology {
     /// Ends, junctions and loops of the skeleton, and then doors.
     pub nodes: Vec<TopologicalNode>,
     /// Each by few points: the others are at most a cell away from their straight connections.
@@ -15,10 +15,12 @@ pub struct Topology {
 }
 
 /// Extracts the nodes of a map and the paths between them. An empty map has none.
-pub fn extract(grid: &Grid<'_>, parameters: &TopologyExtractorParameters) -> Topology {
-    let Some((graph, distances)) = skeleton_graph(grid, &parameters.skeleton()) else { return Topology::default() };
+pub fn extract(grid: &Grid<'_>, parameters: &TopologyExtractorParameters) -> ExtractedTopology {
+    let Some((graph, distances)) = skeleton_graph(grid, &parameters.skeleton()) else {
+        return ExtractedTopology::default();
+    };
     let is_kept = kept_nodes(&graph, parameters.min_piece);
-    let mut topology = Topology::default();
+    let mut topology = ExtractedTopology::default();
     let mut numbers = Vec::with_capacity(graph.nodes.len());
     for (node, is_kept) in graph.nodes.iter().zip(&is_kept) {
         numbers.push(topology.nodes.len() as u32);
@@ -63,7 +65,7 @@ fn kept_nodes(graph: &SkeletonGraph, min_piece: f64) -> Vec<bool> {
     (0..pieces.len()).map(is_large).collect()
 }
 
-impl Topology {
+impl ExtractedTopology {
     fn add_node(&mut self, grid: &Grid<'_>, cell: Cell, kind: &str) -> u32 {
         let Point2 { coords } = grid.geometry.centre(cell);
         self.nodes.push(TopologicalNode { x: coords.x, y: coords.y, kind: kind.into(), probability: 1.0 });

@@ -18,7 +18,7 @@ mod stage;
 mod tests;
 
 pub use doors::doors;
-pub use extract::{Topology, extract};
+pub use extract::{ExtractedTopology, extract};
 pub use parameters::TopologyExtractorParameters;
 pub use simplify::simplify;
 

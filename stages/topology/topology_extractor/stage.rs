@@ -1,6 +1,6 @@
 //! The stage: a topological map for every map.
 
-use super::{Topology, TopologyExtractorParameters, extract};
+use super::{ExtractedTopology, TopologyExtractorParameters, extract};
 use crate::shared::geometry::Grid;
 use gridweave_runtime::ros::{OccupancyGrid, TopologicalMap};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
@@ -35,7 +35,7 @@ impl TopologyExtractor {
                 return Ok(());
             }
         };
-        let Topology { nodes, paths } = extract(&grid, &self.parameters);
+        let ExtractedTopology { nodes, paths } = extract(&grid, &self.parameters);
         output.topology.send(robot, &TopologicalMap { header: map.header.clone(), robot: robot.into(), nodes, paths })
     }
 }

@@ -4,7 +4,7 @@ use super::*;
 use crate::shared::geometry::{Grid, GridGeometry, Point2, UNKNOWN, pose};
 use crate::shared::test_world::floor_plan::{FloorPlan, drawing, seen};
 
-fn office(yaw: f64) -> (Topology, Vec<Point2>) {
+fn office(yaw: f64) -> (ExtractedTopology, Vec<Point2>) {
     let map = FloorPlan::office().draw(seen(-0.5, -0.5, 20.5, 12.5), drawing(3.0, 4.0, yaw));
     let topology = extract(&Grid::new(map.geometry, &map.cells).unwrap(), &TopologyExtractorParameters::default());
     let doors = topology.nodes.iter().filter(|node| node.kind == "door");

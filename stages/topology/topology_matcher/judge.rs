@@ -4,7 +4,7 @@ use super::{MatchedPose, Topology, TopologyMatcherParameters};
 
 /// Verdict on the poses of a pair.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Judgement {
+pub struct PoseJudgement {
     /// Whether the best pose is used.
     pub accepted: bool,
     /// Share of the paths of the map with fewer that coincide with paths of the other at the best pose, 0 to 1.
@@ -19,7 +19,12 @@ pub struct Judgement {
 /// The published methods take the best pose in any case. Here the best pose must have enough coinciding paths, and
 /// clearly more than any other: unrelated and self-similar maps have no clear best one. It is no check against the
 /// walls, and it can be wrong.
-pub fn judge(a: &Topology, b: &Topology, poses: &[MatchedPose], parameters: &TopologyMatcherParameters) -> Judgement {
+pub fn judge(
+    a: &Topology,
+    b: &Topology,
+    poses: &[MatchedPose],
+    parameters: &TopologyMatcherParameters,
+) -> PoseJudgement {
     let count = |map: &Topology| map.long_paths(parameters.tolerance).count();
     let fewer = count(a).min(count(b));
     let Some(best) = poses.first() else {
@@ -27,7 +32,7 @@ pub fn judge(a: &Topology, b: &Topology, poses: &[MatchedPose], parameters: &Top
             0 => "a topological map has no path that is longer than twice the tolerance",
             _ => "no paths of the topological maps coincide at any pose\ntry: let one robot drive where the other was",
         };
-        return Judgement { accepted: false, score: 0.0, reason: reason.into() };
+        return PoseJudgement { accepted: false, score: 0.0, reason: reason.into() };
     };
     let score = (best.similarity as f64 / fewer.max(1) as f64).min(1.0);
     let elsewhere = poses.get(1).map_or(0, |matched_pose| matched_pose.similarity);
@@ -47,5 +52,5 @@ pub fn judge(a: &Topology, b: &Topology, poses: &[MatchedPose], parameters: &Top
         Some(missing) => format!("{found}\n{missing}\ntry: let one robot drive where the other was"),
         None => found,
     };
-    Judgement { accepted: missing.is_none(), score, reason }
+    PoseJudgement { accepted: missing.is_none(), score, reason }
 }

@@ -29,7 +29,7 @@ mod tests;
 
 pub use exhaustive::{Exhaustive, exhaustive};
 pub use icp_svd::{IcpSvd, icp_svd, icp_svd_from};
-pub use judge::{Judgement, judge};
+pub use judge::{PoseJudgement, judge};
 pub use matched_pose::{MatchedPose, distinct};
 pub use parameters::{MatchingMethod, TopologyMatcherParameters};
 pub use similarity::{PathPair, coinciding};

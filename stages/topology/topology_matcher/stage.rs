@@ -1,7 +1,7 @@
 //! The stage: keeps each robot's last topological map, and matches those of each pair.
 
 use super::icp_svd::IcpSvd;
-use super::judge::{Judgement, judge};
+use super::judge::{PoseJudgement, judge};
 use super::matched_pose::MatchedPose;
 use super::parameters::{MatchingMethod, TopologyMatcherParameters};
 use super::{Topology, exhaustive, icp_svd};
@@ -105,7 +105,7 @@ impl TopologyMatcher {
             return output.alignment.send("", &Alignment { reason, ..of_pair });
         }
         let (poses, work) = self.poses(a, b, output);
-        let Judgement { accepted, score, reason } = judge(a, b, &poses, &self.parameters);
+        let PoseJudgement { accepted, score, reason } = judge(a, b, &poses, &self.parameters);
         let verdict = Alignment { score, accepted, reason: format!("{reason}\n\n{work}"), ..of_pair.clone() };
         output.alignment.send("", &placed(verdict, poses.first()))?;
         for (rank, matched_pose) in (0..).zip(&poses) {

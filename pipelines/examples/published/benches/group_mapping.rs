@@ -12,7 +12,7 @@ use gridweave_published::log_odds::LogOdds;
 use gridweave_published::pgvd_extractor::{PgvdExtractorParameters, topological_map};
 use gridweave_published::radon_aligner::{NamedMap, PreparedMap, RadonAlignerParameters, WallPoints, align, energy};
 use gridweave_published::uncertain_transform::{UncertainTransformParameters, transform};
-use gridweave_stages::merge::grid_fuser::layout::Lattice;
+use gridweave_stages::merge::grid_fuser::layout::CellLattice;
 use gridweave_stages::merge::grid_fuser::{KnownArea, PlacedGrid};
 use gridweave_stages::shared::geometry::{Grid, Point2, Pose2};
 use gridweave_stages::shared::test_world::building;
@@ -39,7 +39,7 @@ fn main() {
         let frame = Pose2::rotation(0.35);
         let area = KnownArea::of(&b);
         let anchor = Point2::from(a.geometry.origin.translation.vector);
-        let lattice = Lattice { anchor, resolution: 0.05, max_extent: 1000.0, max_cells: 100_000_000 };
+        let lattice = CellLattice { anchor, resolution: 0.05, max_extent: 1000.0, max_cells: 100_000_000 };
         let carry = |[x, yaw]: [f64; 2]| {
             let covariance = Matrix3::from_diagonal(&Vector3::new(x * x, x * x, yaw * yaw));
             let placed = PlacedGrid::rigid(b, frame);

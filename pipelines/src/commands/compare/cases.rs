@@ -1,6 +1,6 @@
 //! The inputs of a comparison: logs with their truth, and pairs of map files.
 
-use super::score::{PairTruth, Truth};
+use super::score::{CaseTruth, PairTruth};
 use crate::evaluate::check_truth;
 use crate::shipped;
 use crate::status::BadUse;
@@ -33,7 +33,7 @@ pub(super) struct Case {
     pub(super) log: PathBuf,
     /// The robot whose frame is the world; `None` leaves the choice to the pipeline.
     pub(super) reference: Option<String>,
-    pub(super) truth: Truth,
+    pub(super) truth: CaseTruth,
     /// The files of the user that it is made of.
     pub(super) files: Vec<PathBuf>,
 }
@@ -127,7 +127,7 @@ impl Finder<'_> {
         check_truth(&truth)?;
         let name = log.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let files = vec![log.to_owned(), truth.clone()];
-        Ok(Case { name, input, log: log.to_owned(), reference: None, truth: Truth::Frames(truth), files })
+        Ok(Case { name, input, log: log.to_owned(), reference: None, truth: CaseTruth::Frames(truth), files })
     }
 
     /// Writes each pair of map files that a folder lists as a log.
@@ -145,7 +145,7 @@ impl Finder<'_> {
             let log = self.folder.join(format!("pair{}.mcap", before + place));
             let robots = self.write_log(&files, &log).with_context(|| format!("in the pair {}", pair.pair))?;
             let (input, truth) =
-                (input.display().to_string(), Truth::Places { robots: robots.clone(), places: pair.truth });
+                (input.display().to_string(), CaseTruth::Places { robots: robots.clone(), places: pair.truth });
             let [a, _] = robots;
             let files = files.into_iter().chain([path.clone()]).collect();
             Ok(Case { name: pair.pair, input, log, reference: Some(a), truth, files })

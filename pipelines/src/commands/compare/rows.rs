@@ -107,12 +107,12 @@ fn at(sorted: &[f64], share: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::score::{Scored, Truth};
+    use super::super::score::{CaseTruth, Scored};
     use super::*;
     use std::path::PathBuf;
 
     fn case(name: &str, input: &str) -> Case {
-        let truth = Truth::Frames(PathBuf::new());
+        let truth = CaseTruth::Frames(PathBuf::new());
         let files = Vec::new();
         Case { name: name.into(), input: input.into(), log: PathBuf::new(), reference: None, truth, files }
     }

@@ -1,6 +1,6 @@
 //! Comparison of the summary of a run with the truth.
 
-use crate::common_places::{self, CommonPlace};
+use crate::common_places::{self, PlacePair};
 use crate::evaluate::{RobotOutcome, evaluate, read_summary};
 use anyhow::Result;
 use gridweave_logs::summary::Summary;
@@ -14,7 +14,7 @@ const RIGHT_P90: f64 = 1.0;
 
 /// The truth of a log.
 #[derive(Debug)]
-pub(super) enum Truth {
+pub(super) enum CaseTruth {
     /// A truth file, as `evaluate` reads it.
     Frames(PathBuf),
     /// Places that two maps have in common.
@@ -30,7 +30,7 @@ pub(super) enum Truth {
 pub(super) struct PairTruth {
     /// `x_b, y_b, x_a, y_a`: a place in b's and the same in a's map frame, metres. Empty if the maps have nothing in
     /// common.
-    common: Vec<CommonPlace>,
+    common: Vec<PlacePair>,
     /// Median distance of the places under the best rigid transform, which the deformation of the maps causes, metres.
     #[serde(default)]
     rigid_median: f64,
@@ -49,7 +49,7 @@ pub(super) struct Scored {
     pub(super) error_deg: Option<f64>,
 }
 
-impl Truth {
+impl CaseTruth {
     /// Scores the summary of a run.
     pub(super) fn score(&self, summary: &Path) -> Result<Vec<Scored>> {
         match self {

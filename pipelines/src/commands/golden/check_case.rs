@@ -16,7 +16,7 @@ use gridweave_runtime::stage::Registry;
 pub(super) struct CaseOutcome {
     /// `KIND/CASE`.
     pub(super) name: String,
-    pub(super) status: Status,
+    pub(super) status: CaseStatus,
     /// Why the case fails, besides the differences.
     pub(super) problems: Vec<String>,
     /// Differences from the expected log, if there is one that can be read.
@@ -25,9 +25,9 @@ pub(super) struct CaseOutcome {
     pub(super) written: Option<Written>,
 }
 
-/// Status of a case.
+/// The status of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Status {
+pub(super) enum CaseStatus {
     /// All is as expected.
     Passed,
     /// Something is not as expected.
@@ -45,7 +45,7 @@ pub(super) fn check_case(
 ) -> CaseOutcome {
     let failed = |error: anyhow::Error| CaseOutcome {
         name: folder.name(),
-        status: Status::Failed,
+        status: CaseStatus::Failed,
         problems: vec![format!("{error:#}")],
         comparison: None,
         written: None,
@@ -61,22 +61,22 @@ fn check(folder: &CaseFolder, args: &GoldenArgs, registry: &Registry, observer: 
     let holds = problems.is_empty();
     let CaseVerdict { comparison, wrong } = compare(&case, &got, args.limit);
     let status = match wrong {
-        None if holds => Status::Passed,
-        None => Status::Failed,
+        None if holds => CaseStatus::Passed,
+        None => CaseStatus::Failed,
         Some(wrong) if args.bless && holds => {
             got.write(&case.expected)?;
-            Status::Blessed(wrong.blessing)
+            CaseStatus::Blessed(wrong.blessing)
         }
         Some(wrong) => {
             if args.bless {
                 problems.push("not blessed, since a condition of [[expect]] does not hold".to_owned());
             }
             problems.extend(wrong.problem);
-            Status::Failed
+            CaseStatus::Failed
         }
     };
     let differs = comparison.as_ref().is_none_or(|comparison| !comparison.is_empty());
-    let written = match status == Status::Failed && differs {
+    let written = match status == CaseStatus::Failed && differs {
         true => Some(differences::write(&args.differences, folder, &got, comparison.as_ref())?),
         false => None,
     };

@@ -14,7 +14,7 @@ const MAX_GRIDS: usize = 12;
 #[derive(Debug, Default)]
 pub(super) struct Comparison {
     /// The first differences, by topic and log time.
-    pub(super) differences: Vec<Difference>,
+    pub(super) differences: Vec<MessageDifference>,
     /// Number of all differences.
     pub(super) count: usize,
     /// Number of messages that differ from the expected ones.
@@ -31,7 +31,7 @@ pub(super) struct Comparison {
 
 /// A difference in a message or a warning.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Difference {
+pub(super) struct MessageDifference {
     /// The topic; none for a warning.
     pub(super) topic: Option<String>,
     /// The log time of the message.
@@ -91,7 +91,7 @@ impl Comparison {
         texts.collect::<Vec<_>>().join(", ")
     }
 
-    fn add(&mut self, difference: impl FnOnce() -> Difference, limit: usize) {
+    fn add(&mut self, difference: impl FnOnce() -> MessageDifference, limit: usize) {
         self.count += 1;
         if self.differences.len() < limit {
             self.differences.push(difference());
@@ -101,7 +101,7 @@ impl Comparison {
     /// Compares the messages of one topic: those of equal log time with each other, in the order in which they were
     /// sent.
     fn topic(&mut self, expected: &[&Recorded], got: &[&Recorded], tolerance: f64, limit: usize) {
-        let whole = |message: &Recorded, expected: &str, got: &str| Difference {
+        let whole = |message: &Recorded, expected: &str, got: &str| MessageDifference {
             topic: Some(message.channel.topic.clone()),
             log_time: Some(message.log_time),
             field: None,
@@ -135,7 +135,7 @@ impl Comparison {
 
     fn message(&mut self, expected: &Recorded, got: &Recorded, tolerance: f64, limit: usize) {
         let before = self.count;
-        let difference = |field: Option<&str>, expected_text: String, got_text: String| Difference {
+        let difference = |field: Option<&str>, expected_text: String, got_text: String| MessageDifference {
             topic: Some(expected.channel.topic.clone()),
             log_time: Some(expected.log_time),
             field: field.map(str::to_owned),
@@ -181,7 +181,7 @@ impl Comparison {
             self.warnings += 1;
             let field = Some(format!("warning {text:?}"));
             self.add(
-                || Difference { topic: None, log_time: None, field, expected: times(expected), got: times(got) },
+                || MessageDifference { topic: None, log_time: None, field, expected: times(expected), got: times(got) },
                 limit,
             );
         }

@@ -1,7 +1,7 @@
 //! The report on all cases as text and JSON.
 
-use super::check_case::{CaseOutcome, Status};
-use super::compare::{Comparison, Difference, GridDifference};
+use super::check_case::{CaseOutcome, CaseStatus};
+use super::compare::{Comparison, GridDifference, MessageDifference};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -18,10 +18,10 @@ pub(super) struct Report {
 impl Report {
     /// Whether a case has failed or is missing.
     pub(super) fn has_failed(&self) -> bool {
-        self.count(|status| *status == Status::Failed) > 0 || !self.kinds_without_a_case.is_empty()
+        self.count(|status| *status == CaseStatus::Failed) > 0 || !self.kinds_without_a_case.is_empty()
     }
 
-    fn count(&self, of: impl Fn(&Status) -> bool) -> usize {
+    fn count(&self, of: impl Fn(&CaseStatus) -> bool) -> usize {
         self.cases.iter().filter(|case| of(&case.status)).count()
     }
 
@@ -40,7 +40,8 @@ impl Report {
         for kind in &self.kinds_without_a_case {
             writeln!(text, "FAILED   {kind}: this stage kind has no case in {}", folder.display())?;
         }
-        let (passed, failed) = (self.count(|status| *status == Status::Passed), self.count(|s| *s == Status::Failed));
+        let (passed, failed) =
+            (self.count(|status| *status == CaseStatus::Passed), self.count(|s| *s == CaseStatus::Failed));
         let blessed = self.cases.len() - passed - failed;
         let cases = if self.cases.len() == 1 { "case" } else { "cases" };
         write!(text, "{} {cases}: {passed} as expected", self.cases.len())?;
@@ -69,15 +70,15 @@ impl Report {
 
 fn write_case(case: &CaseOutcome, text: &mut String) -> std::fmt::Result {
     match &case.status {
-        Status::Passed => return writeln!(text, "ok       {}", case.name),
-        Status::Failed => writeln!(text, "FAILED   {}", case.name)?,
-        Status::Blessed(reason) => writeln!(text, "blessed  {}: {reason}", case.name)?,
+        CaseStatus::Passed => return writeln!(text, "ok       {}", case.name),
+        CaseStatus::Failed => writeln!(text, "FAILED   {}", case.name)?,
+        CaseStatus::Blessed(reason) => writeln!(text, "blessed  {}: {reason}", case.name)?,
     }
     for problem in &case.problems {
         writeln!(text, "    {}", problem.trim_end().replace('\n', "\n    "))?;
     }
     if let Some(comparison) = &case.comparison {
-        if case.status == Status::Failed && !comparison.is_empty() {
+        if case.status == CaseStatus::Failed && !comparison.is_empty() {
             writeln!(text, "    {}", comparison.summary())?;
         }
         write_differences(comparison, text)?;
@@ -95,7 +96,7 @@ fn write_case(case: &CaseOutcome, text: &mut String) -> std::fmt::Result {
 fn write_differences(comparison: &Comparison, text: &mut String) -> std::fmt::Result {
     let mut last = None;
     for difference in &comparison.differences {
-        let Difference { topic, log_time, field, expected, got } = difference;
+        let MessageDifference { topic, log_time, field, expected, got } = difference;
         let message = (topic, log_time);
         if let (Some(topic), Some(log_time)) = message
             && last != Some(message)
@@ -132,9 +133,9 @@ fn picture(case: &CaseOutcome, at: usize) -> Option<&Result<PathBuf, String>> {
 
 fn case_json(case: &CaseOutcome) -> Value {
     let (status, reason) = match &case.status {
-        Status::Passed => ("passed", None),
-        Status::Failed => ("failed", None),
-        Status::Blessed(reason) => ("blessed", Some(reason)),
+        CaseStatus::Passed => ("passed", None),
+        CaseStatus::Failed => ("failed", None),
+        CaseStatus::Blessed(reason) => ("blessed", Some(reason)),
     };
     let comparison = case.comparison.as_ref();
     let differences = comparison.map(|found| found.differences.iter().map(difference_json).collect::<Vec<_>>());
@@ -166,8 +167,8 @@ fn case_json(case: &CaseOutcome) -> Value {
     })
 }
 
-fn difference_json(difference: &Difference) -> Value {
-    let Difference { topic, log_time, field, expected, got } = difference;
+fn difference_json(difference: &MessageDifference) -> Value {
+    let MessageDifference { topic, log_time, field, expected, got } = difference;
     json!({
         "topic": topic,
         "log_time": log_time.map(|time| time.0),

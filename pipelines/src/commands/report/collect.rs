@@ -1,7 +1,7 @@
 //! Collects the data of the page from logs, moment by moment.
 
 use super::grids::grid;
-use super::model::{Findings, Frame, Hypothesis, Pair, Registration, Report, Robot, Tag};
+use super::model::{Findings, FrameRow, HypothesisRow, PageData, PairRow, RegistrationRow, Robot, TagMark};
 use crate::job::NamingOptions;
 use crate::merge_log::{MergeState, Opened, PlacedRobot, Placing, RobotState};
 use anyhow::Result;
@@ -49,10 +49,11 @@ fn some_of(times: &[f64], most: usize) -> Vec<f64> {
 }
 
 /// Collects the data at some of the moments.
-pub(super) fn collect(logs: &[PathBuf], naming: &NamingOptions, times: &[f64], limits: Limits) -> Result<Report> {
+pub(super) fn collect(logs: &[PathBuf], naming: &NamingOptions, times: &[f64], limits: Limits) -> Result<PageData> {
     let mut opened = Opened::new(logs, naming)?;
     let times = some_of(times, limits.steps);
-    let mut report = Report { logs: logs.iter().map(|log| log.display().to_string()).collect(), ..Report::default() };
+    let mut report =
+        PageData { logs: logs.iter().map(|log| log.display().to_string()).collect(), ..PageData::default() };
     report.metadata = opened.metadata();
     let mut robots: BTreeMap<String, Robot> = BTreeMap::new();
     for (step, time) in times.iter().enumerate() {
@@ -69,8 +70,8 @@ pub(super) fn collect(logs: &[PathBuf], naming: &NamingOptions, times: &[f64], l
 }
 
 /// Collects the data at one moment only, for a run in progress.
-pub(super) fn collect_moment(name: &str, state: &MergeState, seconds: f64, side: usize) -> Result<Report> {
-    let mut report = Report { logs: vec![name.to_owned()], times: vec![round(seconds)], ..Report::default() };
+pub(super) fn collect_moment(name: &str, state: &MergeState, seconds: f64, side: usize) -> Result<PageData> {
+    let mut report = PageData { logs: vec![name.to_owned()], times: vec![round(seconds)], ..PageData::default() };
     let mut robots = BTreeMap::new();
     take_moment(&mut report, &mut robots, state, 0, true, side)?;
     report.robots = robots.into_iter().map(|(name, robot)| Robot { name, ..robot }).collect();
@@ -80,7 +81,7 @@ pub(super) fn collect_moment(name: &str, state: &MergeState, seconds: f64, side:
 
 /// Adds the state at a moment of the given number; at the last one also each robot's map in its own frame.
 fn take_moment(
-    report: &mut Report,
+    report: &mut PageData,
     robots: &mut BTreeMap<String, Robot>,
     state: &MergeState,
     step: usize,
@@ -138,7 +139,7 @@ fn findings(robot: &PlacedRobot, known: &RobotState) -> Findings {
     let tags = known.tags.iter().flat_map(|found| &found.tags).map(|tag| {
         let [x, y] = place(tag.x, tag.y);
         let ellipse = ellipse(&tag.covariance, turn);
-        Tag { id: tag.tag_id.clone(), x, y, ellipse, certainty: round(tag.certainty), readings: tag.readings }
+        TagMark { id: tag.tag_id.clone(), x, y, ellipse, certainty: round(tag.certainty), readings: tag.readings }
     });
     let merged = known.path.as_ref().filter(|_| robot.is_merged);
     let path: Vec<[f64; 2]> = match merged {
@@ -177,9 +178,9 @@ fn ellipse(covariance: &[f64; 4], turn: f64) -> [f64; 3] {
 }
 
 /// Adds the tables of the final state.
-fn add_tables(report: &mut Report, state: &MergeState) {
+fn add_tables(report: &mut PageData, state: &MergeState) {
     if let Some(frames) = &state.frames {
-        let of = |reference: &str, frames: &[RobotFrame]| -> Vec<Frame> {
+        let of = |reference: &str, frames: &[RobotFrame]| -> Vec<FrameRow> {
             frames.iter().map(|frame| frame_row(frame, reference)).collect()
         };
         report.frames = of(&frames.reference, &frames.frames);
@@ -194,7 +195,7 @@ fn add_tables(report: &mut Report, state: &MergeState) {
     let with_pose = state.hypotheses.iter().flat_map(|((topic, ..), hypotheses)| {
         hypotheses.iter().filter(|hypothesis| hypothesis.has_transform).map(move |hypothesis| (topic, hypothesis))
     });
-    let rows = with_pose.map(|(topic, hypothesis)| Hypothesis {
+    let rows = with_pose.map(|(topic, hypothesis)| HypothesisRow {
         topic: topic.clone(),
         a: hypothesis.a.clone(),
         b: hypothesis.b.clone(),
@@ -213,7 +214,7 @@ fn add_tables(report: &mut Report, state: &MergeState) {
 }
 
 /// Makes the curves of ICP errors, all to one scale.
-fn registrations<'a>(registrations: impl Iterator<Item = &'a IcpErrors> + Clone) -> Vec<Registration> {
+fn registrations<'a>(registrations: impl Iterator<Item = &'a IcpErrors> + Clone) -> Vec<RegistrationRow> {
     let finite =
         |icp: &IcpErrors| -> Vec<f64> { icp.errors.iter().copied().filter(|error| error.is_finite()).collect() };
     let top = registrations.clone().flat_map(finite).fold(f64::MIN_POSITIVE, f64::max);
@@ -225,7 +226,7 @@ fn registrations<'a>(registrations: impl Iterator<Item = &'a IcpErrors> + Clone)
             format!("{}{x:.1} {:.1}", if number == 0 { 'M' } else { 'L' }, CURVE[1] * (1.0 - error / top))
         };
         let metres = |error: Option<&f64>| error.map_or_else(|| "-".to_owned(), |error| format!("{error:.3}"));
-        Registration {
+        RegistrationRow {
             a: icp.a.clone(),
             b: icp.b.clone(),
             source: icp.source.clone(),
@@ -244,9 +245,9 @@ fn score(score: f64) -> String {
     format!("{score:.4}")
 }
 
-fn pair_row(verdict: &gridweave_runtime::ros::Verdict) -> Pair {
+fn pair_row(verdict: &gridweave_runtime::ros::Verdict) -> PairRow {
     let alignment = &verdict.alignment;
-    Pair {
+    PairRow {
         a: alignment.a.clone(),
         b: alignment.b.clone(),
         accepted: alignment.accepted,
@@ -257,9 +258,9 @@ fn pair_row(verdict: &gridweave_runtime::ros::Verdict) -> Pair {
     }
 }
 
-fn frame_row(frame: &RobotFrame, reference: &str) -> Frame {
+fn frame_row(frame: &RobotFrame, reference: &str) -> FrameRow {
     let deviation = |index: usize| frame.covariance[index].max(0.0).sqrt();
-    Frame {
+    FrameRow {
         robot: frame.robot.clone(),
         reference: reference.to_owned(),
         x: format!("{:.3}", frame.x),

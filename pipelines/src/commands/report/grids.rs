@@ -1,6 +1,6 @@
 //! Maps for the page: reduced in size, as PNG.
 
-use super::model::Grid;
+use super::model::MapImage;
 use anyhow::{Context, Result};
 use base64::prelude::{BASE64_STANDARD, Engine};
 use gridweave_runtime::ros::MapMetaData;
@@ -12,7 +12,7 @@ use image::{ExtendedColorType, ImageEncoder};
 const UNKNOWN: u8 = 255;
 
 /// Encodes a map with at most `side` cells along a side; a larger map gets larger cells.
-pub(super) fn grid(info: &MapMetaData, cells: &[i8], side: usize) -> Result<Option<Grid>> {
+pub(super) fn grid(info: &MapMetaData, cells: &[i8], side: usize) -> Result<Option<MapImage>> {
     let (width, height) = (info.width as usize, info.height as usize);
     let resolution = f64::from(info.resolution);
     let is_sound = width.checked_mul(height) == Some(cells.len()) && resolution.is_finite() && resolution > 0.0;
@@ -39,7 +39,7 @@ pub(super) fn grid(info: &MapMetaData, cells: &[i8], side: usize) -> Result<Opti
     let written = encoder.write_image(&shades, columns as u32, rows as u32, ExtendedColorType::L8);
     written.context("cannot encode a map as PNG")?;
     let [x, y, yaw] = numbers;
-    Ok(Some(Grid {
+    Ok(Some(MapImage {
         width: columns as u32,
         height: rows as u32,
         resolution: resolution * factor as f64,

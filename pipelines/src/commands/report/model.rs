@@ -35,20 +35,20 @@ impl<T: PartialEq> Versions<T> {
 
 /// All data of the page.
 #[derive(Debug, Default, Serialize)]
-pub(super) struct Report {
+pub(super) struct PageData {
     /// The names of the logs.
     pub(super) logs: Vec<String>,
     /// The moments: seconds from the first message.
     pub(super) times: Vec<f64>,
     pub(super) robots: Vec<Robot>,
-    pub(super) merged: Versions<Option<Grid>>,
-    pub(super) conflicts: Versions<Option<Grid>>,
-    pub(super) hypotheses: Vec<Hypothesis>,
-    pub(super) registrations: Vec<Registration>,
+    pub(super) merged: Versions<Option<MapImage>>,
+    pub(super) conflicts: Versions<Option<MapImage>>,
+    pub(super) hypotheses: Vec<HypothesisRow>,
+    pub(super) registrations: Vec<RegistrationRow>,
     /// Frames at the last moment.
-    pub(super) frames: Vec<Frame>,
+    pub(super) frames: Vec<FrameRow>,
     pub(super) unmerged: Vec<(String, String)>,
-    pub(super) pairs: Vec<Pair>,
+    pub(super) pairs: Vec<PairRow>,
     pub(super) agreement: Option<[f64; 3]>,
     /// Metadata of the log: name and text.
     pub(super) metadata: Vec<(String, String)>,
@@ -58,7 +58,7 @@ pub(super) struct Report {
 
 /// A map.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(super) struct Grid {
+pub(super) struct MapImage {
     pub(super) width: u32,
     pub(super) height: u32,
     /// Side of a cell, metres.
@@ -78,10 +78,10 @@ pub(super) struct Robot {
     /// Colour such as `#0072b2`.
     pub(super) colour: String,
     /// Its last map in its own frame.
-    pub(super) own: Option<Grid>,
+    pub(super) own: Option<MapImage>,
     /// The pose of its map frame at the end: x, y and yaw.
     pub(super) pose: [f64; 3],
-    pub(super) map: Versions<Option<Grid>>,
+    pub(super) map: Versions<Option<MapImage>>,
     pub(super) findings: Versions<Findings>,
 }
 
@@ -92,7 +92,7 @@ pub(super) struct Findings {
     pub(super) segments: Vec<[f64; 6]>,
     /// Origin of the map frame, direction of the walls, its standard deviation, the agreement.
     pub(super) direction: Option<[f64; 5]>,
-    pub(super) tags: Vec<Tag>,
+    pub(super) tags: Vec<TagMark>,
     /// The path of the robot.
     pub(super) path: Vec<[f64; 2]>,
     /// Nodes of the deformation: position, displacement and rotation of each.
@@ -103,7 +103,7 @@ pub(super) struct Findings {
 }
 
 #[derive(Debug, PartialEq, Serialize)]
-pub(super) struct Tag {
+pub(super) struct TagMark {
     pub(super) id: String,
     pub(super) x: f64,
     pub(super) y: f64,
@@ -115,7 +115,7 @@ pub(super) struct Tag {
 
 /// A hypothesis for a pair, with its pose `T_a_b`.
 #[derive(Debug, Serialize)]
-pub(super) struct Hypothesis {
+pub(super) struct HypothesisRow {
     /// The topic that it was sent on.
     pub(super) topic: String,
     pub(super) a: String,
@@ -133,7 +133,7 @@ pub(super) struct Hypothesis {
 
 /// Errors of ICP over its iterations, from one initial guess.
 #[derive(Debug, PartialEq, Serialize)]
-pub(super) struct Registration {
+pub(super) struct RegistrationRow {
     pub(super) a: String,
     pub(super) b: String,
     pub(super) source: String,
@@ -150,7 +150,7 @@ pub(super) struct Registration {
 
 /// The pose of a robot's map frame, as text for a table.
 #[derive(Debug, Serialize)]
-pub(super) struct Frame {
+pub(super) struct FrameRow {
     pub(super) robot: String,
     /// The robot whose map frame the pose is in.
     pub(super) reference: String,
@@ -165,7 +165,7 @@ pub(super) struct Frame {
 
 /// The decision on a pair.
 #[derive(Debug, Serialize)]
-pub(super) struct Pair {
+pub(super) struct PairRow {
     pub(super) a: String,
     pub(super) b: String,
     pub(super) accepted: bool,

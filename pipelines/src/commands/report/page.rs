@@ -1,7 +1,7 @@
 //! Rendering of the page from templates, a style, a script, and data.
 
 use super::graph::{Drawing, drawing};
-use super::model::Report;
+use super::model::PageData;
 use anyhow::{Context, Result};
 use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment, Value as Html, context};
@@ -45,7 +45,7 @@ struct Stage {
 ///
 /// # Errors
 /// The data cannot be encoded as JSON, or a template is wrong.
-pub(super) fn render(report: &Report, summary: Option<&Value>) -> Result<String> {
+pub(super) fn render(report: &PageData, summary: Option<&Value>) -> Result<String> {
     render_part("page", report, summary, false)
 }
 
@@ -53,7 +53,7 @@ pub(super) fn render(report: &Report, summary: Option<&Value>) -> Result<String>
 ///
 /// # Errors
 /// As for [`render`].
-pub(super) fn render_live(report: &Report, summary: &Value) -> Result<String> {
+pub(super) fn render_live(report: &PageData, summary: &Value) -> Result<String> {
     render_part("page", report, Some(summary), true)
 }
 
@@ -61,14 +61,14 @@ pub(super) fn render_live(report: &Report, summary: &Value) -> Result<String> {
 ///
 /// # Errors
 /// As for [`render`].
-pub(super) fn render_change(report: &Report, summary: &Value) -> Result<String> {
+pub(super) fn render_change(report: &PageData, summary: &Value) -> Result<String> {
     let part = |name: &str| Ok::<_, anyhow::Error>(Value::from(render_part(name, report, Some(summary), true)?));
     let (headline, findings) = (part("headline")?, part("findings")?);
     Ok(format!(r#"{{"headline":{headline},"findings":{findings},"data":{}}}"#, data(report)?))
 }
 
 /// Renders one of the templates.
-fn render_part(name: &str, report: &Report, summary: Option<&Value>, is_live: bool) -> Result<String> {
+fn render_part(name: &str, report: &PageData, summary: Option<&Value>, is_live: bool) -> Result<String> {
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
     for (name, text) in TEMPLATES {
@@ -116,7 +116,7 @@ fn script(is_live: bool) -> String {
 }
 
 /// The text of the pipeline that has written the log, from its metadata.
-fn pipeline(report: &Report) -> Option<&str> {
+fn pipeline(report: &PageData) -> Option<&str> {
     let found = report.metadata.iter().find(|(name, _)| name == PIPELINE);
     found.map(|(_, text)| text.as_str())
 }
@@ -127,7 +127,7 @@ fn value(value: impl Serialize) -> Html {
 }
 
 /// Encodes the data as JSON for a script element: no text in it can end the element.
-fn data(report: &Report) -> Result<String> {
+fn data(report: &PageData) -> Result<String> {
     let text = serde_json::to_string(report).context("cannot encode the data of the page as JSON")?;
     Ok(text.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026"))
 }
@@ -184,7 +184,7 @@ mod tests {
 
     #[test]
     fn texts_of_a_log_or_a_summary_are_never_markup() {
-        let mut report = Report { logs: vec![MARKUP.into()], times: vec![1.0], ..Report::default() };
+        let mut report = PageData { logs: vec![MARKUP.into()], times: vec![1.0], ..PageData::default() };
         report.unmerged = vec![(MARKUP.into(), MARKUP.into())];
         report.metadata = vec![(MARKUP.into(), MARKUP.into())];
         report.problems = vec![MARKUP.into()];
@@ -192,7 +192,7 @@ mod tests {
         let summary = json!({"stages": {MARKUP: {"busy_ms": 1.0, "warnings": {MARKUP: 2}, "counts": {MARKUP: 3}}}});
         let page = render(&report, Some(&summary)).unwrap();
         let scripts = page.matches("<script").count();
-        let empty = render(&Report::default(), None).unwrap();
+        let empty = render(&PageData::default(), None).unwrap();
         assert_eq!((scripts, page.matches("</script").count()), (empty.matches("<script").count(), 2));
         assert!(!page.contains("alert(1)</script>") && !page.contains("<!--"));
         assert!(page.contains("&lt;&#x2f;script&gt;") && page.contains("\\u003c/script\\u003e"), "{page}");
@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn the_page_loads_nothing_from_elsewhere() {
-        let page = render(&Report::default(), None).unwrap();
+        let page = render(&PageData::default(), None).unwrap();
         for text in ["http://", "https://", "src=", "@import", "url(", "fetch(", "XMLHttpRequest"] {
             assert!(!page.contains(text), "{text}");
         }

@@ -3,7 +3,7 @@
 use super::{UncertainTransformParameters, transform};
 use gridweave_runtime::ros::{Header, OccupancyGrid, RobotFrame, RobotFrames};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
-use gridweave_stages::merge::grid_fuser::layout::Lattice;
+use gridweave_stages::merge::grid_fuser::layout::CellLattice;
 use gridweave_stages::merge::grid_fuser::{KnownArea, PlacedGrid};
 use gridweave_stages::shared::geometry::Point2;
 use gridweave_stages::shared::robot_maps::RobotMaps;
@@ -83,13 +83,13 @@ impl UncertainTransform {
     }
 
     /// The lattice of the reference robot's map, if that is there.
-    fn lattice(&self) -> Option<Lattice> {
+    fn lattice(&self) -> Option<CellLattice> {
         let reference = &self.frames.reference;
         let frame = self.frames.frames.iter().find(|frame| frame.robot == *reference)?;
         let geometry = self.maps.get(reference)?.grid().geometry;
         let corner = frame.transform_reference_robot() * geometry.origin;
         let UncertainTransformParameters { resolution, max_extent, max_cells, .. } = self.parameters;
-        Some(Lattice {
+        Some(CellLattice {
             anchor: Point2::from(corner.translation.vector),
             resolution: resolution.unwrap_or(geometry.resolution),
             max_extent,

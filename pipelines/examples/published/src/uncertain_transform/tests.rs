@@ -4,7 +4,7 @@ use super::*;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{OccupancyGrid, RobotFrame, RobotFrames};
 use gridweave_runtime::stage::StageHarness;
-use gridweave_stages::merge::grid_fuser::layout::Lattice;
+use gridweave_stages::merge::grid_fuser::layout::CellLattice;
 use gridweave_stages::merge::grid_fuser::{KnownArea, PlacedGrid};
 use gridweave_stages::shared::geometry::{Grid, GridGeometry, Point2, Pose2, UNKNOWN, pose};
 use gridweave_stages::shared::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
@@ -143,7 +143,7 @@ fn office(resolution: f64) -> DrawnMap {
 fn carried(map: &DrawnMap, frame: Pose2, covariance: &Matrix3<f64>) -> Transformed {
     let grid = Grid::new(map.geometry, &map.cells).unwrap();
     let anchor = Point2::from(map.geometry.origin.translation.vector);
-    let lattice = Lattice { anchor, resolution: map.geometry.resolution, max_extent: 100.0, max_cells: 1_000_000 };
+    let lattice = CellLattice { anchor, resolution: map.geometry.resolution, max_extent: 100.0, max_cells: 1_000_000 };
     let (placed, area) = (PlacedGrid::rigid(grid, frame), KnownArea::of(&grid));
     transform(&placed, &area, covariance, &lattice, &Default::default()).unwrap().unwrap()
 }

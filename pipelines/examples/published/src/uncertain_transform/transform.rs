@@ -3,7 +3,7 @@
 use super::{Kernel, PointCovariance, UncertainTransformParameters, convolve};
 use crate::log_odds::LogOdds;
 use gridweave_stages::merge::grid_fuser::evidence::EvidenceTable;
-use gridweave_stages::merge::grid_fuser::layout::{Lattice, LeftOut, layout_of};
+use gridweave_stages::merge::grid_fuser::layout::{CellLattice, LeftOut, layout_of};
 use gridweave_stages::merge::grid_fuser::{Fused, KnownArea, PlacedGrid, inverse};
 use gridweave_stages::shared::geometry::{Grid, GridGeometry, Point2, UNKNOWN, pose};
 use nalgebra::Matrix3;
@@ -38,7 +38,7 @@ pub fn transform(
     map: &PlacedGrid<'_>,
     area: &KnownArea,
     covariance: &Matrix3<f64>,
-    lattice: &Lattice,
+    lattice: &CellLattice,
     parameters: &UncertainTransformParameters,
 ) -> Result<Option<Transformed>, NotTransformed> {
     let resolution = lattice.resolution;

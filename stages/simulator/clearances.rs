@@ -14,7 +14,7 @@ pub(super) const FREE_CLEARANCE: f64 = 0.8;
 
 /// The distance from the nearest obstacle for every cell of a raster over a building.
 #[derive(Clone, Debug)]
-pub(super) struct FreeSpace {
+pub(super) struct Clearances {
     min: Point2,
     columns: usize,
     rows: usize,
@@ -22,7 +22,7 @@ pub(super) struct FreeSpace {
     reachable: Vec<bool>,
 }
 
-impl FreeSpace {
+impl Clearances {
     /// The free space of a building that can be reached from its first corridor.
     pub(super) fn of(plan: &FloorPlan) -> Self {
         let entrance = plan.corridors.first().map_or(plan.bounds.centre(), Rectangle::centre);
