@@ -45,7 +45,7 @@ pub use scanned_map::ScanSettings;
 pub use shape::{Rectangle, Solid};
 pub use simulation::{Simulation, simulate};
 pub use stage::kind;
-pub use tags::{Tag, TagReading};
+pub use tags::{SimulatedReading, Tag};
 pub use world::SimulationError;
 
 pub use crate::shared::scan_grid::SnapshotMap;

@@ -2,7 +2,7 @@
 
 use super::floor_plan::{BuildingSize, Layout};
 use super::lidar::Lidar;
-use super::tags::TagReader;
+use super::tags::ReaderModel;
 use super::wheel_odometry::OdometryErrors;
 use gridweave_runtime::stage::{ParameterError, Parameters};
 use schemars::JsonSchema;
@@ -199,8 +199,8 @@ impl SimulatorParameters {
         }
     }
 
-    pub(super) fn tag_reader(&self) -> TagReader {
-        TagReader {
+    pub(super) fn tag_reader(&self) -> ReaderModel {
+        ReaderModel {
             reach: self.tag_reach,
             noise: self.tag_noise,
             lost: self.lost_readings,

@@ -7,7 +7,7 @@ use super::mapper::Mapper;
 use super::parameters::SimulatorParameters;
 use super::route::plan_route;
 use super::shape::{Rectangle, between};
-use super::tags::TagReading;
+use super::tags::SimulatedReading;
 use super::wheel_odometry::wheel_odometry;
 use super::world::{SimulationError, Stream, World};
 use crate::shared::geometry::{Point2, Pose2, is_free, pose};
@@ -38,7 +38,7 @@ pub struct RobotLog {
     /// odometry is not logged.
     pub odometry: Vec<Pose2>,
     /// The tags that it has read, with their ticks.
-    pub readings: Vec<(usize, TagReading)>,
+    pub readings: Vec<(usize, SimulatedReading)>,
     /// Scans of its lidar, one per tick; none if scans are not logged.
     pub(super) scans: Vec<Vec<Beam>>,
     /// The maps it has sent, with the ticks of their last scans.
@@ -142,7 +142,7 @@ fn read_tags(
     robot: usize,
     true_poses: &[Pose2],
     parameters: &SimulatorParameters,
-) -> Vec<(usize, TagReading)> {
+) -> Vec<(usize, SimulatedReading)> {
     let reader = parameters.tag_reader();
     let mut random = world.random(Stream::Tags(robot));
     let mut readings = Vec::new();

@@ -33,9 +33,9 @@ pub struct Tag {
     pub place: Point2,
 }
 
-/// What reads tags.
+/// The model of a tag reader: its range and its errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct TagReader {
+pub(super) struct ReaderModel {
     /// The longest distance of a reading, metres.
     pub(super) reach: f64,
     /// Standard deviation of a range, metres.
@@ -46,9 +46,9 @@ pub(super) struct TagReader {
     pub(super) reflected: f64,
 }
 
-/// One reading.
+/// One reading of a tag.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TagReading {
+pub struct SimulatedReading {
     /// Which tag: its place in the list of tags.
     pub tag: usize,
     /// Metres.
@@ -57,7 +57,7 @@ pub struct TagReading {
     pub rssi: f32,
 }
 
-impl TagReader {
+impl ReaderModel {
     /// Reads all tags from a true pose in the building, in the order of the list.
     pub(super) fn read(
         &self,
@@ -65,7 +65,7 @@ impl TagReader {
         world: &RayCaster,
         robot_pose: &Pose2,
         random: &mut impl Rng,
-        mut reading: impl FnMut(TagReading),
+        mut reading: impl FnMut(SimulatedReading),
     ) {
         let antenna = Point2::from(robot_pose.translation.vector);
         for (tag, Tag { place, .. }) in tags.iter().enumerate() {
@@ -84,7 +84,7 @@ impl TagReader {
             }
             let way = if reflected { distance + detour } else { distance };
             let rssi = -45.0 - 20.0 * way.max(0.1).log10() + 2.0 * fading;
-            reading(TagReading { tag, range: (way + self.noise * noise).max(0.0), rssi: rssi as f32 });
+            reading(SimulatedReading { tag, range: (way + self.noise * noise).max(0.0), rssi: rssi as f32 });
         }
     }
 }
@@ -172,7 +172,7 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    const READER: TagReader = TagReader { reach: 3.0, noise: 0.05, lost: 0.0, reflected: 0.0 };
+    const READER: ReaderModel = ReaderModel { reach: 3.0, noise: 0.05, lost: 0.0, reflected: 0.0 };
 
     fn world() -> (Vec<Tag>, RayCaster) {
         let walls = [Rectangle::new(2.0, -5.0, 2.2, 5.0), Rectangle::new(-6.0, -5.0, -5.8, 5.0)];
@@ -181,7 +181,7 @@ mod tests {
         (tags, RayCaster::new(&walls.map(Solid::from)))
     }
 
-    fn readings(reader: TagReader) -> Vec<TagReading> {
+    fn readings(reader: ReaderModel) -> Vec<SimulatedReading> {
         let (tags, world) = world();
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let mut readings = Vec::new();
@@ -206,7 +206,7 @@ mod tests {
 
     #[test]
     fn readings_are_lost_and_reflected_as_often_as_asked() {
-        let readings = readings(TagReader { lost: 0.3, reflected: 0.1, ..READER });
+        let readings = readings(ReaderModel { lost: 0.3, reflected: 0.1, ..READER });
         assert!((readings.len() as f64 / 4000.0 - 0.7).abs() < 0.03);
         let long = readings.iter().filter(|reading| reading.range > 2.45).count();
         assert!((long as f64 / readings.len() as f64 - 0.1).abs() < 0.02);
@@ -216,7 +216,7 @@ mod tests {
     fn a_reach_or_a_pose_that_is_no_number_reads_nothing() {
         let (tags, world) = world();
         let mut random = ChaCha8Rng::seed_from_u64(5);
-        let nan = TagReader { reach: f64::NAN, ..READER };
+        let nan = ReaderModel { reach: f64::NAN, ..READER };
         nan.read(&tags, &world, &pose(0.0, 0.0, 0.0), &mut random, |_| panic!("read"));
         READER.read(&tags, &world, &pose(f64::NAN, 0.0, 0.0), &mut random, |_| panic!("read"));
     }

@@ -2,7 +2,7 @@
 
 use super::Mode;
 use super::middle_grey::unknown_middle;
-use super::shades::{Histogram, Shades, is_transparent};
+use super::shades::{ShadeCounts, Shades, is_transparent};
 use super::warning::{MapFileWarning, Misread, UnknownGrey};
 use gridweave_runtime::ros::cell;
 use std::ops::RangeInclusive;
@@ -53,7 +53,7 @@ impl Reading {
         if self.mode == Mode::Scale && has_opacity {
             return (self, MapFileWarning::default());
         }
-        let Histogram { mut greys, transparent } = shades.histogram();
+        let ShadeCounts { mut greys, transparent } = shades.histogram();
         // `raw` has no thresholds.
         if self.mode == Mode::Raw {
             return (self, MapFileWarning { shaded: shaded_as_others(&greys), ..Default::default() });

@@ -33,7 +33,7 @@ pub(super) struct Shades {
 }
 
 /// How many pixels have each shade.
-pub(super) struct Histogram {
+pub(super) struct ShadeCounts {
     /// The grey shades, 0 for black to 255 for white.
     pub(super) greys: [u64; 256],
     /// The number of transparent pixels, which are in none of these.
@@ -116,8 +116,8 @@ impl Shades {
     }
 
     /// The histogram of the shades.
-    pub(super) fn histogram(&self) -> Histogram {
-        let mut histogram = Histogram { greys: [0; 256], transparent: 0 };
+    pub(super) fn histogram(&self) -> ShadeCounts {
+        let mut histogram = ShadeCounts { greys: [0; 256], transparent: 0 };
         match &self.image {
             DynamicImage::ImageLuma8(grey) => {
                 grey.as_raw().iter().for_each(|shade| histogram.greys[usize::from(*shade)] += 1);
@@ -133,7 +133,7 @@ impl Shades {
         histogram
     }
 
-    fn count<T: Copy + Into<f64>>(&self, samples: &[T], histogram: &mut Histogram) {
+    fn count<T: Copy + Into<f64>>(&self, samples: &[T], histogram: &mut ShadeCounts) {
         let channels = usize::from(self.image.color().channel_count()).max(1);
         let colours = if self.has_opacity() { channels - 1 } else { channels };
         for pixel in samples.chunks_exact(channels) {

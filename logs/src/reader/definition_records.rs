@@ -7,13 +7,15 @@ use std::collections::BTreeMap;
 /// What an entry of a channel's metadata takes in memory beside its texts, bytes.
 const ENTRY: usize = 80;
 
+/// The definition of a message type in a file.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Schema {
+pub(super) struct SchemaRecord {
     pub(super) name: String,
     pub(super) encoding: String,
     pub(super) text: Vec<u8>,
 }
 
+/// A channel of a file: its topic, encoding and message type.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ChannelRecord {
     pub(super) schema: u16,
@@ -22,7 +24,7 @@ pub(super) struct ChannelRecord {
     pub(super) metadata: BTreeMap<String, String>,
 }
 
-impl Schema {
+impl SchemaRecord {
     pub(super) fn size(&self) -> usize {
         self.name.len() + self.encoding.len() + self.text.len()
     }
@@ -53,12 +55,12 @@ impl<'a> SchemaFields<'a> {
         self.name.len() + self.encoding.len() + self.text.len()
     }
 
-    pub(super) fn is(&self, known: &Schema) -> bool {
+    pub(super) fn is(&self, known: &SchemaRecord) -> bool {
         (&*self.name, &*self.encoding, self.text) == (known.name.as_str(), known.encoding.as_str(), &*known.text)
     }
 
-    pub(super) fn to_schema(&self) -> Schema {
-        Schema { name: self.name.to_string(), encoding: self.encoding.to_string(), text: self.text.to_vec() }
+    pub(super) fn to_schema(&self) -> SchemaRecord {
+        SchemaRecord { name: self.name.to_string(), encoding: self.encoding.to_string(), text: self.text.to_vec() }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The channels and schemas that a log describes.
 
-use super::definition_records::{ChannelFields, ChannelRecord, Schema, SchemaFields};
+use super::definition_records::{ChannelFields, ChannelRecord, SchemaFields, SchemaRecord};
 use super::record::{Fields, Record};
 use super::ros1::{self, Converted};
 use crate::dynamic::Recoder;
@@ -20,7 +20,7 @@ pub(crate) const MOST_BYTES: usize = 64 << 20;
 /// The channels and schemas of one file, by number. They take at most [`MOST_BYTES`].
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Definitions {
-    schemas: BTreeMap<u16, Schema>,
+    schemas: BTreeMap<u16, SchemaRecord>,
     channels: BTreeMap<u16, ChannelRecord>,
     /// The size of all that is kept, bytes.
     size: usize,
@@ -70,7 +70,7 @@ impl Definitions {
         let Channel { topic, message_encoding, schema_name: name, schema_encoding: encoding, schema: text, metadata } =
             channel;
         let schema = if name.is_empty() { 0 } else { number };
-        let described = Schema { name, encoding, text };
+        let described = SchemaRecord { name, encoding, text };
         let channel = ChannelRecord { schema, topic, message_encoding, metadata };
         if !fits(&mut self.size, described.size() + channel.size()) {
             self.refuse(number);
@@ -117,7 +117,7 @@ impl Definitions {
             if schema.is_none() && refused_schemas.contains(&channel.schema) {
                 return false;
             }
-            left = left.saturating_sub(schema.map_or(0, Schema::size) + channel.size());
+            left = left.saturating_sub(schema.map_or(0, SchemaRecord::size) + channel.size());
             left > 0
         });
         refused.len() + before - self.channels.len()
@@ -134,7 +134,7 @@ impl Definitions {
                 .or_insert_with_key(|(name, text)| Converted::of(name, &String::from_utf8_lossy(text)));
             if let Some(Converted { type_name, definition, recoder }) = converted {
                 let (name, text) = (type_name.clone(), definition.clone().into_bytes());
-                *schema = Schema { name, encoding: "ros2msg".to_owned(), text };
+                *schema = SchemaRecord { name, encoding: "ros2msg".to_owned(), text };
                 recoders.insert(*id, Arc::clone(recoder));
             }
         }
@@ -211,7 +211,7 @@ mod tests {
         let mut definitions = Definitions::default();
         definitions
             .schemas
-            .insert(1, Schema { name: "a/A".into(), encoding: "ros2msg".into(), text: vec![b' '; 1 << 20] });
+            .insert(1, SchemaRecord { name: "a/A".into(), encoding: "ros2msg".into(), text: vec![b' '; 1 << 20] });
         let channel = |topic: &str| ChannelRecord {
             schema: 1,
             topic: topic.into(),

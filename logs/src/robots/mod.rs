@@ -33,7 +33,7 @@ pub(crate) use mounts::{BASES, NoTransform};
 pub(crate) use other_maps::{robots_with_unread_maps, unread_map};
 pub(crate) use part_names::{PLACES, is_part};
 pub(crate) use peculiarities::{Peculiarity, peculiarities};
-pub(crate) use pose::{NoPose, pose_with_covariance};
+pub(crate) use pose::{NotAPose, pose_with_covariance};
 pub(crate) use poses_in_map::PosesInMap;
 pub use resolutions::Resolutions;
 pub(crate) use resolutions::{problem_of_resolutions, with_resolution};

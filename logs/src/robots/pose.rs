@@ -16,22 +16,22 @@ struct OdometryStart {
 
 /// The message cannot be read as a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct NoPose;
+pub(crate) struct NotAPose;
 
 /// Converts an encoded message of the given type to an encoded [`PoseWithCovarianceStamped`]. The covariance is zero if
 /// the type has none.
-pub(crate) fn pose_with_covariance(source: PoseSource, bytes: &[u8]) -> Result<Cow<'_, [u8]>, NoPose> {
+pub(crate) fn pose_with_covariance(source: PoseSource, bytes: &[u8]) -> Result<Cow<'_, [u8]>, NotAPose> {
     let pose = match source {
-        PoseSource::Pose => decode::<PoseStamped>(bytes).map_err(|_| NoPose)?.into(),
+        PoseSource::Pose => decode::<PoseStamped>(bytes).map_err(|_| NotAPose)?.into(),
         PoseSource::PoseWithCovariance => {
-            return decode::<PoseWithCovarianceStamped>(bytes).map(|_| Cow::Borrowed(bytes)).map_err(|_| NoPose);
+            return decode::<PoseWithCovarianceStamped>(bytes).map(|_| Cow::Borrowed(bytes)).map_err(|_| NotAPose);
         }
         PoseSource::Odometry => {
-            let OdometryStart { header, pose, .. } = decode(bytes).map_err(|_| NoPose)?;
+            let OdometryStart { header, pose, .. } = decode(bytes).map_err(|_| NotAPose)?;
             PoseWithCovarianceStamped { header, pose }
         }
     };
-    encode(&pose).map(Cow::Owned).map_err(|_| NoPose)
+    encode(&pose).map(Cow::Owned).map_err(|_| NotAPose)
 }
 
 #[cfg(test)]
@@ -83,8 +83,8 @@ mod tests {
         }
         let mut endless = pose.clone();
         endless[12..16].copy_from_slice(&[0xff; 4]);
-        assert_eq!(pose_with_covariance(PoseSource::Pose, &endless), Err(NoPose));
+        assert_eq!(pose_with_covariance(PoseSource::Pose, &endless), Err(NotAPose));
         endless[0] = 9;
-        assert_eq!(pose_with_covariance(PoseSource::Pose, &endless), Err(NoPose));
+        assert_eq!(pose_with_covariance(PoseSource::Pose, &endless), Err(NotAPose));
     }
 }

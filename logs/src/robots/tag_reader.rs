@@ -53,12 +53,12 @@ pub(crate) struct TagMessage {
     pub(crate) stamp: Time,
     /// The frame of positions and bearings.
     pub(crate) frame_id: String,
-    pub(crate) readings: Vec<TagReading>,
+    pub(crate) readings: Vec<LoggedReading>,
 }
 
 /// One tag reading.
 #[derive(Debug, PartialEq)]
-pub(crate) struct TagReading {
+pub(crate) struct LoggedReading {
     pub(crate) tag_id: String,
     pub(crate) measurement: Measurement,
 }
@@ -189,7 +189,7 @@ impl TagReader {
     }
 
     /// Adds the readings in a message or array element: range and bearing, or else position.
-    fn add_readings(&self, robot: &str, of: &Value<'_>, readings: &mut Vec<TagReading>) -> Result<(), String> {
+    fn add_readings(&self, robot: &str, of: &Value<'_>, readings: &mut Vec<LoggedReading>) -> Result<(), String> {
         let find = |path: &FieldPath| of.find(path).map_err(|error| error.to_string());
         let a_number = |path: &FieldPath| number(&find(path)?).ok_or_else(|| format!("`{path}` is not a number"));
         let mut id = Vec::new();
@@ -202,7 +202,7 @@ impl TagReader {
             });
         }
         let tag_id = id.join(":");
-        let mut add = |measurement| readings.push(TagReading { tag_id: tag_id.clone(), measurement });
+        let mut add = |measurement| readings.push(LoggedReading { tag_id: tag_id.clone(), measurement });
         if let Some(distance) = &self.distance {
             let stddev = self.stddev.as_ref().map(a_number).transpose()?;
             let variance = || number(&of.find(self.variance.as_ref()?).ok()?).filter(|variance| *variance > 0.0);

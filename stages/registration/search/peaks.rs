@@ -4,7 +4,7 @@ use super::coordinate_ascent::{Steps, coordinate_ascent};
 use super::exhaustive::ScoredPose;
 use super::overlay::Overlay;
 use super::prepared_map::JUDGED;
-use super::scales::{Scale, search_scales};
+use super::scales::{PosesAtScale, search_scales};
 use super::{MapAlignerParameters, PreparedMap};
 use crate::registration::pose_window::PoseWindow;
 use crate::shared::geometry::{Point2, Pose2, turn_difference};
@@ -58,7 +58,7 @@ impl Peaks {
         let least_wall = if let Extent::Itself { least_wall } = extent { least_wall } else { 0.0 };
         let candidates: Vec<(usize, f64, (Pose2, Point2))> = search_scales(a, b, extent, parameters)
             .into_iter()
-            .flat_map(|Scale { level, step, poses }| {
+            .flat_map(|PosesAtScale { level, step, poses }| {
                 let overlay = overlay(a, b, level, penalty);
                 let apart = apart_from_better(&overlay, &poses, parameters, 2.0 * step, least_wall);
                 apart.into_iter().map(move |candidate| (level, step, candidate))

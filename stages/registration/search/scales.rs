@@ -22,7 +22,7 @@ const MOST_PENALTY: f64 = 100.0;
 const MOST_POSES: usize = 1024;
 
 /// Poses of the search in cells of one size.
-pub(super) struct Scale {
+pub(super) struct PosesAtScale {
     /// Level of the prepared maps.
     pub(super) level: usize,
     /// Spacing of the rotations, radians.
@@ -37,7 +37,7 @@ pub(super) fn search_scales(
     b: &PreparedMap,
     extent: Extent<'_>,
     parameters: &MapAlignerParameters,
-) -> Vec<Scale> {
+) -> Vec<PosesAtScale> {
     let step = 2.0 * parameters.rotation_step;
     let close_step = |level: usize| close_step(a, b, level);
     let narrowest = a.level_of_size(2 * MOST_CELLS).max(b.level_of_size(2 * MOST_CELLS)).max(JUDGED);
@@ -50,7 +50,7 @@ pub(super) fn search_scales(
             false => free_space_penalty,
         };
         let poses = search(coarse_a, coarse_b, extent.window(), rotations, penalty, apart, MOST_POSES);
-        Scale { level, step: rotations.step(), poses }
+        PosesAtScale { level, step: rotations.step(), poses }
     };
     let all_rotations = |level: usize| {
         let all = Rotations::all(step.min(close_step(level)));

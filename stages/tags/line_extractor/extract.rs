@@ -7,7 +7,7 @@ use super::parameters::{Fit, LineExtractorParameters};
 use super::plane_points::PlanePoints;
 use super::ransac::find_walls;
 use super::reliability::reliability;
-use super::scale::Scale;
+use super::scale::CellLengths;
 use super::surface::surface_cells;
 use super::wall::{Wall, fit_stretch};
 use crate::shared::geometry::{Cell, Grid, Point2};
@@ -29,7 +29,7 @@ const OUTLIER_DEVIATIONS: f64 = 2.5;
 ///
 /// The same grid, parameters and seed give the same walls.
 pub fn extract_segments(grid: &Grid<'_>, parameters: &LineExtractorParameters, seed: u64) -> Vec<Segment> {
-    let scale = Scale::new(parameters, grid.geometry.resolution);
+    let scale = CellLengths::new(parameters, grid.geometry.resolution);
     let index_of =
         |points: &[Point2]| PlanePoints::new(points, grid.geometry.width, grid.geometry.height, scale.bucket_side);
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -70,7 +70,7 @@ fn sub_sample(points: &[Point2], count: usize, random: &mut impl Rng) -> Vec<Poi
 }
 
 /// Fits a wall to all cells near it. Returns the stretch and the number of cells.
-fn final_fit(index: &PlanePoints, wall: &Wall, fit: Fit, scale: &Scale) -> Option<(Stretch, usize)> {
+fn final_fit(index: &PlanePoints, wall: &Wall, fit: Fit, scale: &CellLengths) -> Option<(Stretch, usize)> {
     let stretch = match fit {
         Fit::Faces => fit_to_faces(index, wall.stretch, scale),
         Fit::LeastSquares | Fit::Ends => fit_to_cells(index, wall.stretch, fit, scale)?,
@@ -85,7 +85,7 @@ fn final_fit(index: &PlanePoints, wall: &Wall, fit: Fit, scale: &Scale) -> Optio
 /// Where walls meet, cells of the other wall are on one side of this one and would turn it. And where a thick wall
 /// leaves the grid, a wedge of it remains, whose centre line is half way between the wall and the border: it would
 /// turn the wall towards the border.
-fn inner(index: &PlanePoints, stretch: &Stretch, scale: &Scale) -> Stretch {
+fn inner(index: &PlanePoints, stretch: &Stretch, scale: &CellLengths) -> Stretch {
     let margin = if stretch.length() > 6.0 * scale.reach { scale.reach } else { 0.0 };
     let inner = Stretch { line: stretch.line, start: stretch.start + margin, end: stretch.end - margin };
     // A wall along a border of the grid has no other part.
@@ -94,7 +94,7 @@ fn inner(index: &PlanePoints, stretch: &Stretch, scale: &Scale) -> Stretch {
 }
 
 /// Fits a stretch to the faces of its wall.
-fn fit_to_faces(index: &PlanePoints, mut stretch: Stretch, scale: &Scale) -> Stretch {
+fn fit_to_faces(index: &PlanePoints, mut stretch: Stretch, scale: &CellLengths) -> Stretch {
     let mut cells = Vec::new();
     for _ in 0..FACE_FITS {
         let inner = inner(index, &stretch, scale);
@@ -117,7 +117,7 @@ fn fit_to_faces(index: &PlanePoints, mut stretch: Stretch, scale: &Scale) -> Str
 }
 
 /// Fits a stretch to all cells near it.
-fn fit_to_cells(index: &PlanePoints, mut stretch: Stretch, fit: Fit, scale: &Scale) -> Option<Stretch> {
+fn fit_to_cells(index: &PlanePoints, mut stretch: Stretch, fit: Fit, scale: &CellLengths) -> Option<Stretch> {
     let mut reach = scale.reach;
     let mut near = Vec::new();
     for _ in 0..FINAL_FITS {

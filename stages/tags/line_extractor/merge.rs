@@ -2,7 +2,7 @@
 
 use super::line::Line;
 use super::parameters::LineExtractorParameters;
-use super::scale::Scale;
+use super::scale::CellLengths;
 use super::wall::Wall;
 use crate::shared::geometry::Point2;
 
@@ -13,7 +13,7 @@ pub(super) fn merge_walls(
     points: &[Point2],
     mut walls: Vec<Wall>,
     parameters: &LineExtractorParameters,
-    scale: &Scale,
+    scale: &CellLengths,
 ) -> Vec<Wall> {
     loop {
         let before = walls.len();
@@ -38,7 +38,13 @@ pub(super) fn merge_walls(
     }
 }
 
-fn merge(points: &[Point2], a: &Wall, b: &Wall, parameters: &LineExtractorParameters, scale: &Scale) -> Option<Wall> {
+fn merge(
+    points: &[Point2],
+    a: &Wall,
+    b: &Wall,
+    parameters: &LineExtractorParameters,
+    scale: &CellLengths,
+) -> Option<Wall> {
     let (direction_a, direction_b) = (a.stretch.line.direction(), b.stretch.line.direction());
     if direction_a.perp(&direction_b).abs() >= parameters.merge_angle.sin() {
         return None;
@@ -74,7 +80,7 @@ mod tests {
             let line = Line::through(&points[first], &points[first + 1]).unwrap();
             walls.push(Wall::of_members(&points, (first..points.len()).collect(), &line, Fit::LeastSquares).unwrap());
         }
-        merge_walls(&points, walls, &parameters, &Scale::new(&parameters, 0.05))
+        merge_walls(&points, walls, &parameters, &CellLengths::new(&parameters, 0.05))
     }
 
     #[test]
@@ -89,7 +95,7 @@ mod tests {
             let line = Line::through(&points[range.start], &points[range.start + 1]).unwrap();
             Wall::of_members(&points, range.collect(), &line, Fit::LeastSquares).unwrap()
         };
-        let scale = Scale::new(&parameters, 0.05);
+        let scale = CellLengths::new(&parameters, 0.05);
         assert_eq!(merge_walls(&points, vec![wall(0..20), wall(20..40)], &parameters, &scale).len(), 2);
     }
 }

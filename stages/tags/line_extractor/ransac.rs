@@ -3,7 +3,7 @@
 use super::line::Line;
 use super::parameters::{LineExtractorParameters, Sampling, Scoring};
 use super::plane_points::PlanePoints;
-use super::scale::Scale;
+use super::scale::CellLengths;
 use super::wall::{Wall, break_down, fit_stretch};
 use rand::{Rng, RngExt};
 
@@ -14,7 +14,7 @@ const REFITS: usize = 1;
 pub(super) fn find_walls(
     index: &PlanePoints,
     parameters: &LineExtractorParameters,
-    scale: &Scale,
+    scale: &CellLengths,
     random: &mut impl Rng,
 ) -> Vec<Wall> {
     let search = Search { index, parameters, scale };
@@ -72,7 +72,7 @@ struct Found {
 struct Search<'a> {
     index: &'a PlanePoints,
     parameters: &'a LineExtractorParameters,
-    scale: &'a Scale,
+    scale: &'a CellLengths,
 }
 
 impl Search<'_> {
@@ -219,7 +219,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     fn walls_of(points: &[Point2], parameters: &LineExtractorParameters) -> Vec<Wall> {
-        let scale = Scale::new(parameters, 0.05);
+        let scale = CellLengths::new(parameters, 0.05);
         let index = PlanePoints::new(points, 400, 400, scale.bucket_side);
         find_walls(&index, parameters, &scale, &mut ChaCha8Rng::seed_from_u64(1))
     }

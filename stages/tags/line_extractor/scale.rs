@@ -7,7 +7,7 @@ const LEAST_REACH: f64 = 0.75;
 
 /// Lengths of the parameters in cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Scale {
+pub(super) struct CellLengths {
     /// See [`LineExtractorParameters::inlier_distance`].
     pub(super) reach: f64,
     /// See [`LineExtractorParameters::sampling_radius`].
@@ -22,7 +22,7 @@ pub(super) struct Scale {
     pub(super) bucket_side: f64,
 }
 
-impl Scale {
+impl CellLengths {
     /// The lengths for a grid of `resolution` metres a cell.
     pub(super) fn new(parameters: &LineExtractorParameters, resolution: f64) -> Self {
         // Cells of many metres, or of less than an atom, must not make a search endless or a radius empty.

@@ -35,7 +35,7 @@ pub struct TagLocalizer {
     track: PoseTrack,
     tags: BTreeMap<String, Tag>,
     /// Readings later than the last pose, by time and then in order of arrival.
-    pending: BTreeMap<(LogTime, u64), TagReading>,
+    pending: BTreeMap<(LogTime, u64), WaitingReading>,
     /// Number of readings that have waited.
     waited: u64,
     /// Number of readings of tags of long range when these were last located.
@@ -47,9 +47,9 @@ pub struct TagLocalizer {
     estimated_poses: Vec<(LogTime, Pose2)>,
 }
 
-/// A reading: its time, its tag, and its measurement.
+/// A reading that waits for the pose of its time.
 #[derive(Clone, Debug, PartialEq)]
-struct TagReading {
+struct WaitingReading {
     time: LogTime,
     tag_id: String,
     measured: Measured,
@@ -159,7 +159,7 @@ impl TagLocalizer {
         if range > FARTHEST {
             return Err(ReadingProblem::TooFar);
         }
-        self.place_or_wait(TagReading { time, tag_id: tag_id.to_owned(), measured: Measured::Range(range), stddev })
+        self.place_or_wait(WaitingReading { time, tag_id: tag_id.to_owned(), measured: Measured::Range(range), stddev })
     }
 
     /// Adds a sighting of a tag, metres ahead of the robot and to its left, with its covariance (zeros if it is
@@ -176,7 +176,7 @@ impl TagLocalizer {
         }
         let stddev = sighting_deviation(&place, covariance, self.parameters.sighting_stddev)
             .ok_or(ReadingProblem::NoPosition)?;
-        self.place_or_wait(TagReading { time, tag_id: tag_id.to_owned(), measured: Measured::Place(place), stddev })
+        self.place_or_wait(WaitingReading { time, tag_id: tag_id.to_owned(), measured: Measured::Place(place), stddev })
     }
 
     /// Adds a bearing of a tag: radians, counterclockwise from straight ahead of the robot, with its standard
@@ -202,10 +202,10 @@ impl TagLocalizer {
         let stddev = bearing_stddev.max(stddev).min(bearing_stddev.max(PI));
         let measured = Measured::Bearing { sensor, bearing, stddev };
         // The distance is unknown: at most as far as tags are perceived.
-        self.place_or_wait(TagReading { time, tag_id: tag_id.to_owned(), measured, stddev: stddev * reach })
+        self.place_or_wait(WaitingReading { time, tag_id: tag_id.to_owned(), measured, stddev: stddev * reach })
     }
 
-    fn place_or_wait(&mut self, reading: TagReading) -> Result<(), ReadingProblem> {
+    fn place_or_wait(&mut self, reading: WaitingReading) -> Result<(), ReadingProblem> {
         let time = reading.time;
         match self.track.latest_time().is_some_and(|latest| time <= latest) {
             true => self.place(reading),
@@ -224,8 +224,8 @@ impl TagLocalizer {
         }
     }
 
-    fn place(&mut self, reading: TagReading) -> Result<(), ReadingProblem> {
-        let TagReading { time, tag_id, measured, stddev } = reading;
+    fn place(&mut self, reading: WaitingReading) -> Result<(), ReadingProblem> {
+        let WaitingReading { time, tag_id, measured, stddev } = reading;
         let position = self.track.position(time, self.parameters.max_pose_age).map_err(|problem| match problem {
             NoPose::Before => ReadingProblem::NoPoseBefore,
             NoPose::TooOld => ReadingProblem::PoseTooOld,

@@ -48,7 +48,7 @@ fn every_element_of_an_array_is_a_reading() {
         fields.range_unit = Some(0.001);
     }))
     .unwrap();
-    let reading = |id: &str, range, stddev| TagReading {
+    let reading = |id: &str, range, stddev| LoggedReading {
         tag_id: id.into(),
         measurement: Measurement::Range { range, stddev, rssi: 0.0 },
     };
@@ -82,7 +82,7 @@ fn a_bearing_is_read_alone_or_beside_the_range() {
         fields.bearing_stddev_field = Some("deviation".into());
     };
     let found = read(&fields(degrees)).unwrap().readings;
-    let bearing = |id: &str, bearing: f64, stddev| TagReading {
+    let bearing = |id: &str, bearing: f64, stddev| LoggedReading {
         tag_id: id.into(),
         measurement: Measurement::Bearing { bearing, stddev },
     };
@@ -132,7 +132,7 @@ fn a_sensors_range_is_named_by_its_frame_without_the_robot() {
         let reader = TagReader::new(&channel(name, text), &known_fields(name).unwrap()).unwrap();
         let found = reader.read("robot1", &bytes).unwrap();
         let measurement = Measurement::Range { range: 1.25, stddev, rssi: 0.0 };
-        assert_eq!(found.readings, [TagReading { tag_id: "tag7".into(), measurement }]);
+        assert_eq!(found.readings, [LoggedReading { tag_id: "tag7".into(), measurement }]);
         assert!(reader.read("robot1", b"cut").is_err());
     }
 }
@@ -167,8 +167,10 @@ fn tags_of_isaac_ros_are_read_by_its_published_definition() {
     let bytes = encode(&(header.clone(), vec![of_tag(5), of_tag(12)])).unwrap();
     let reader = TagReader::new(&channel(name, &text), &known_fields(name).unwrap()).unwrap();
     let found = reader.read("robot1", &bytes).unwrap();
-    let seen =
-        |id: &str| TagReading { tag_id: id.into(), measurement: Measurement::Position(Point3::new(0.5, -0.25, 2.0)) };
+    let seen = |id: &str| LoggedReading {
+        tag_id: id.into(),
+        measurement: Measurement::Position(Point3::new(0.5, -0.25, 2.0)),
+    };
     assert_eq!(found.readings, [seen("36h11:5"), seen("36h11:12")]);
     assert_eq!((found.stamp, found.frame_id.as_str()), (Time { sec: 3, nanosec: 4 }, "camera"));
 }
@@ -192,7 +194,7 @@ fn tags_of_aruco_opencv_are_read_by_its_published_definition() {
     let bytes = encode(&(header, vec![(7u16, POSE)], vec![("board", POSE)])).unwrap();
     let reader = TagReader::new(&channel(name, &text), &known_fields(name).unwrap()).unwrap();
     let measurement = Measurement::Position(Point3::new(0.5, -0.25, 2.0));
-    assert_eq!(reader.read("robot1", &bytes).unwrap().readings, [TagReading { tag_id: "7".into(), measurement }]);
+    assert_eq!(reader.read("robot1", &bytes).unwrap().readings, [LoggedReading { tag_id: "7".into(), measurement }]);
 }
 
 #[test]

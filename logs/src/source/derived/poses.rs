@@ -2,7 +2,7 @@
 
 use super::super::RobotMessages;
 use super::super::channel::Route;
-use crate::robots::{InferredPoses, NoPose, PoseSource, PosesInMap, RobotChannels, Role, pose_with_covariance};
+use crate::robots::{InferredPoses, NotAPose, PoseSource, PosesInMap, RobotChannels, Role, pose_with_covariance};
 use crate::tf::TfPoses;
 use gridweave_runtime::ros::{Header, PoseStamped, PoseWithCovarianceStamped, TFMessage, decode};
 use gridweave_runtime::stage::{Output, RobotTopics, StageError};
@@ -128,7 +128,7 @@ impl DerivedPoses {
                 let in_map = self.in_map.in_map(&route.robot, &pose);
                 output.pose.send_bytes(&route.robot, in_map.as_deref().unwrap_or(&pose))
             }
-            Err(NoPose) => {
+            Err(NotAPose) => {
                 route.unreadable += 1;
                 output.warn(format!("messages on `{}` could not be read as a pose", route.channel.topic));
                 Ok(())
@@ -152,7 +152,7 @@ impl DerivedPoses {
                 output.odometry.send_bytes(&route.robot, &pose)
             }
             // The warning is left to the conversion of the pose.
-            Err(NoPose) => Ok(()),
+            Err(NotAPose) => Ok(()),
         }
     }
 
