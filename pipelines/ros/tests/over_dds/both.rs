@@ -1,6 +1,7 @@
 //! A robot that is heard on both middlewares, as behind a bridge between them.
 
-use crate::domain::{Domain, give, go_on, map, poses, warned};
+use crate::domain::{Domain, map, poses};
+use crate::waiting::{give, wait_for, warned};
 use crate::wire::Router;
 use gridweave_ros::{sink, source};
 use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage, encode};
@@ -39,14 +40,14 @@ fn a_robot_on_both_middlewares_is_heard_once() {
     assert!(text.contains("DDS") && text.contains("Zenoh") && text.contains("alone"), "{text}");
     // Nothing is kept of poses for who subscribes later.
     let mut first = Vec::new();
-    go_on(&mut source, "a pose", |source| {
+    wait_for(&mut source, "pose", |source| {
         give(&mut robot, 1, "/robot1/pose", pose(0));
         first = poses(source);
         !first.is_empty()
     });
     (1..=200).for_each(|number| give(&mut robot, 1, "/robot1/pose", pose(number)));
     let mut heard = Vec::new();
-    go_on(&mut source, "the last pose", |source| {
+    wait_for(&mut source, "last pose", |source| {
         heard.extend(poses(source));
         heard.last() == Some(&200.0)
     });

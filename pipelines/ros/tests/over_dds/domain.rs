@@ -1,14 +1,10 @@
 //! A domain for each test, on this machine alone.
 
 use gridweave_ros::{sink, source};
-use gridweave_runtime::message::{FixedText, LogTime, Message, MessageFlags, MessageHeader};
+use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, PoseStamped, encode};
 use gridweave_runtime::stage::{Context, InputWire, RunLinks, StageHarness};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{Duration, Instant};
-
-/// What takes longer hangs.
-pub(crate) const WATCHDOG: Duration = Duration::from_secs(60);
 
 /// A domain that no other test uses.
 pub(crate) struct Domain(u32);
@@ -66,53 +62,11 @@ impl Domain {
     }
 }
 
-/// Publishes a message by a sink.
-pub(crate) fn give(sink: &mut StageHarness, wire: usize, topic: &str, bytes: Vec<u8>) {
-    let topic = FixedText::new(topic).unwrap();
-    let message = Message::from_vec(MessageHeader { topic, ..Default::default() }, bytes);
-    sink.give_message("in", message.on_wire(wire)).unwrap();
-}
-
 /// A square map, all of whose cells have one value.
 pub(crate) fn map(width: u32, value: u8) -> Vec<u8> {
     let info = MapMetaData { width, height: width, resolution: 0.05, ..Default::default() };
     let header = Header::new(LogTime(1_000_000_000), "map");
     encode(&OccupancyGrid { header, info, data: &vec![value; (width * width) as usize] }).unwrap()
-}
-
-/// Lets a source go on until it has sent so many messages on an output, and gives them.
-#[track_caller]
-pub(crate) fn sent(source: &mut StageHarness, output: &str, count: usize) -> Vec<Message> {
-    let mut messages = Vec::new();
-    go_on(source, &format!("{count} messages on {output}"), |source| {
-        // Before the first message its channel is announced.
-        let is_data = |message: &Message| message.header().flags.contains(MessageFlags::DATA);
-        messages.extend(source.take_messages(output).into_iter().filter(is_data));
-        messages.len() >= count
-    });
-    messages
-}
-
-/// Lets a source go on until it has warned of something, and gives that.
-#[track_caller]
-pub(crate) fn warned(source: &mut StageHarness, of: &str) -> String {
-    let mut text = None;
-    go_on(source, &format!("a warning of {of}"), |source| {
-        text = source.warnings().into_keys().find(|text| text.contains(of));
-        text.is_some()
-    });
-    text.unwrap()
-}
-
-/// Lets a source go on until something holds.
-#[track_caller]
-pub(crate) fn go_on(source: &mut StageHarness, what: &str, mut holds: impl FnMut(&mut StageHarness) -> bool) {
-    let until = Instant::now() + WATCHDOG;
-    while !holds(source) {
-        assert!(Instant::now() < until, "there is not {what}: {:?}", source.warnings());
-        source.node().wait(Duration::from_millis(20));
-        assert!(source.node().advance().unwrap());
-    }
 }
 
 /// Where the robots are by the poses that have come: x of each.

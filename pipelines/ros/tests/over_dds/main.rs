@@ -12,6 +12,8 @@ mod network_namespaces;
 mod quality;
 mod ros_nodes;
 mod stages;
+#[path = "../over_zenoh/waiting.rs"]
+mod waiting;
 #[path = "../over_zenoh/wire.rs"]
 #[allow(dead_code)]
 mod wire;

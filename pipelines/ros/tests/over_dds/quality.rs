@@ -1,7 +1,8 @@
 //! What does not fit is reported once, and the rest goes on.
 
 use crate::command::{GRIDWEAVE, Running, run};
-use crate::domain::{Domain, give, map, sent, warned};
+use crate::domain::{Domain, map};
+use crate::waiting::{give, sent, warned};
 use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage, encode};
 
 #[test]
@@ -64,7 +65,7 @@ fn a_second_run_that_publishes_the_same_is_reported_by_name() {
     let mut other = domain.other_run("other", &wires);
     give(&mut other, 0, "/map", map(20, 1));
     let mut sink = domain.sink_with("", &wires, None);
-    let until = std::time::Instant::now() + crate::domain::WATCHDOG;
+    let until = std::time::Instant::now() + crate::wire::WATCHDOG;
     while sink.warnings().is_empty() {
         assert!(std::time::Instant::now() < until, "there is no warning");
         give(&mut sink, 0, "/map", map(20, 2));
@@ -105,7 +106,7 @@ fn doctor(domain: &Domain, words: &str) -> String {
     let number = format!("domain={}", domain.number());
     let settings = ["middleware=dds", "discovery_range=localhost", &number].into_iter().flat_map(|set| ["--set", set]);
     let arguments: Vec<&str> = ["doctor", "--seconds", "0.5"].into_iter().chain(settings).collect();
-    let until = std::time::Instant::now() + crate::domain::WATCHDOG;
+    let until = std::time::Instant::now() + crate::wire::WATCHDOG;
     loop {
         let text = run(GRIDWEAVE, &arguments, folder.path());
         if text.contains(words) {

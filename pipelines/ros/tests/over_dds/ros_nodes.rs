@@ -3,7 +3,8 @@
 //! `GRIDWEAVE_ROS_PYTHON` names a Python 3.12 with what is in `tests/python/ros_jazzy.txt` or `ros_kilted.txt`.
 
 use crate::command::{GRIDWEAVE, Running, run};
-use crate::domain::{Domain, give, go_on, map, sent, warned};
+use crate::domain::{Domain, map};
+use crate::waiting::{give, sent, wait_for, warned};
 use gridweave_logs::schemas::schema_names;
 use gridweave_ros::key_expression::known_hash;
 use gridweave_runtime::message::LogTime;
@@ -291,7 +292,7 @@ fn stated_hashes(share: &Path) -> BTreeMap<String, String> {
 /// Publishes until there is a warning.
 #[track_caller]
 fn go_on_sending(sink: &mut gridweave_runtime::stage::StageHarness, words: &str) {
-    let until = std::time::Instant::now() + crate::domain::WATCHDOG;
+    let until = std::time::Instant::now() + crate::wire::WATCHDOG;
     while !sink.warnings().keys().any(|text| text.contains(words)) {
         assert!(std::time::Instant::now() < until, "{:?}", sink.warnings());
         give(sink, 0, "/odd", encode(&PoseStamped::default()).unwrap());
@@ -308,7 +309,7 @@ fn a_topic_without_maps_is_reported_and_the_others_received() {
     assert!(warned(&mut source, "/robot1/map").contains("std_msgs/msg/String"));
     let _robot = rclpy(&domain, &["publish_map", "/robot2/map", "20", "0"], folder.path());
     let mut robots = Vec::new();
-    go_on(&mut source, "a map of robot2", |source| {
+    wait_for(&mut source, "map of robot2", |source| {
         robots.extend(source.take_messages("map").iter().map(|message| message.robot().to_owned()));
         robots.contains(&"robot2".to_owned())
     });

@@ -1,6 +1,7 @@
 //! A source among nodes that publish as robots do, and a sink that they are.
 
-use crate::domain::{Domain, give, go_on, map, poses, sent};
+use crate::domain::{Domain, map, poses};
+use crate::waiting::{give, sent, wait_for};
 use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, RosMessage, encode};
 
 const MAP: &[(&str, &str)] = &[(OccupancyGrid::NAME, "/robot1/map")];
@@ -72,14 +73,14 @@ fn messages_come_in_their_order_and_none_is_missing() {
     };
     // Nothing is kept of poses for who comes later.
     let mut first = Vec::new();
-    go_on(&mut source, "a pose", |source| {
+    wait_for(&mut source, "pose", |source| {
         give(&mut robot, 1, "/robot1/pose", pose(0));
         first = poses(source);
         !first.is_empty()
     });
     (1..=1000).for_each(|number| give(&mut robot, 1, "/robot1/pose", pose(number)));
     let mut all = first;
-    go_on(&mut source, "the last pose", |source| {
+    wait_for(&mut source, "last pose", |source| {
         all.extend(poses(source));
         all.last() == Some(&1000.0)
     });

@@ -1,5 +1,6 @@
 //! The two ends of a bridge, on this machine, and a wire between them that can be cut.
 
+use crate::waiting::{sent, wait_for};
 use crate::wire::WATCHDOG;
 use gridweave_runtime::message::{Channel, FixedText, LogTime, Message, MessageFlags, MessageHeader};
 use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, PoseWithCovarianceStamped, RosMessage, encode};
@@ -53,29 +54,6 @@ pub(crate) fn give_pose(sink: &mut StageHarness, time: u64) {
     give(sink, 1, "robot1", "/robot1/pose", time, encode(&pose).unwrap());
 }
 
-/// Lets a source go on until this is so.
-#[track_caller]
-fn wait_for(source: &mut StageHarness, what: &str, mut is_so: impl FnMut(&mut StageHarness) -> bool) {
-    let until = Instant::now() + WATCHDOG;
-    while !is_so(source) {
-        assert!(Instant::now() < until, "{what}: {:?} {:?}", source.warnings(), source.counts());
-        source.node().wait(Duration::from_millis(20));
-        source.node().advance().unwrap();
-    }
-}
-
-/// Lets a source go on until so many messages have come on an output, and gives them.
-#[track_caller]
-pub(crate) fn come(source: &mut StageHarness, output: &str, count: usize) -> Vec<Message> {
-    let mut messages = Vec::new();
-    wait_for(source, output, |source| {
-        let is_data = |message: &Message| message.header().flags.contains(MessageFlags::DATA);
-        messages.extend(source.take_messages(output).into_iter().filter(is_data));
-        messages.len() >= count
-    });
-    messages
-}
-
 fn times(messages: &[Message]) -> Vec<u64> {
     messages.iter().map(|message| message.header().log_time.0).collect()
 }
@@ -91,11 +69,11 @@ fn messages_come_as_they_were_sent_on_the_port_that_they_are_for() {
         give_pose(&mut sink, time);
     }
     give(&mut sink, 2, "", "/map_conflicts", 9, map("world", 9, 3));
-    let came = come(&mut source, "map", 5);
+    let came = sent(&mut source, "map", 5);
     assert_eq!(times(&came), [1, 2, 3, 4, 5]);
     assert!(came.iter().map(Message::bytes).eq(maps.iter().map(Vec::as_slice)));
     assert_eq!((came[0].robot(), came[0].header().topic.as_str()), ("robot1", "/robot1/map"));
-    assert_eq!(times(&come(&mut source, "pose", 5)), [1, 2, 3, 4, 5]);
+    assert_eq!(times(&sent(&mut source, "pose", 5)), [1, 2, 3, 4, 5]);
     // What there is no port for comes with the others, and its channel says what it is.
     let mut others = Vec::new();
     wait_for(&mut source, "other", |source| {
@@ -113,7 +91,7 @@ fn an_end_is_received_and_a_sender_without_one_is_gone() {
     let mut source = source(&endpoint, "end_after = 1");
     let mut dies = sink(&endpoint, "sender = \"dies\"");
     give_pose(&mut dies, 1);
-    come(&mut source, "pose", 1);
+    sent(&mut source, "pose", 1);
     drop(dies);
     wait_for(&mut source, "gone", |source| source.warnings().keys().any(|text| text.contains("`dies` is gone")));
     let ends = thread::spawn({
@@ -219,7 +197,7 @@ fn a_wire_that_is_cut_again_and_again_delays_and_no_more() {
             give(&mut sink, 0, "robot1", "/robot1/map", time, map("robot1/map", time, 100 + 10 * round));
         }
         let so_far = poses.len();
-        poses.extend(come(&mut source, "pose", 5));
+        poses.extend(sent(&mut source, "pose", 5));
         assert!(poses.len() > so_far);
         wire.cut();
         let gone = |source: &StageHarness| {
@@ -247,13 +225,13 @@ fn a_base_that_is_started_again_gets_the_last_of_each_topic() {
     for time in 1..4 {
         give(&mut sink, 0, "robot1", "/robot1/map", time, map("robot1/map", time, 50));
     }
-    come(&mut first, "map", 3);
+    sent(&mut first, "map", 3);
     drop(first);
     let mut second = source(&endpoint, "");
-    let came = come(&mut second, "map", 1);
+    let came = sent(&mut second, "map", 1);
     assert_eq!((times(&came), came[0].bytes()), (vec![3], &*map("robot1/map", 3, 50)));
     give(&mut sink, 0, "robot1", "/robot1/map", 4, map("robot1/map", 4, 60));
-    let came = come(&mut second, "map", 1);
+    let came = sent(&mut second, "map", 1);
     assert_eq!((times(&came), came[0].bytes()), (vec![4], &*map("robot1/map", 4, 60)));
 }
 
@@ -263,7 +241,7 @@ fn the_merged_map_of_a_base_is_the_map_of_a_robot_to_the_next() {
     let mut source = source(&endpoint, "");
     let mut sink = sink(&endpoint, "robot = \"floor1\"");
     give(&mut sink, 0, "", "/map", 5, map("world", 5, 10));
-    let came = come(&mut source, "map", 1).remove(0);
+    let came = sent(&mut source, "map", 1).remove(0);
     assert_eq!((came.robot(), came.header().topic.as_str()), ("floor1", "/floor1/map"));
     assert_eq!(came.decode::<OccupancyGrid<'_>>().unwrap().header.frame_id, "floor1/world");
 }
@@ -276,7 +254,7 @@ fn two_senders_of_one_name_and_a_missing_base_are_reported() {
     let (mut one, mut two) = (sink(&endpoint, "sender = \"twin\""), sink(&endpoint, "sender = \"twin\""));
     give_pose(&mut one, 1);
     give_pose(&mut two, 2);
-    assert_eq!(come(&mut source, "pose", 2).len(), 2);
+    assert_eq!(sent(&mut source, "pose", 2).len(), 2);
     wait_for(&mut source, "twins", |source| {
         source.warnings().keys().any(|text| text.contains("two senders are called `twin`"))
     });

@@ -1,9 +1,9 @@
 //! The verb `bridge`: links of a run that goes on, carried to a base.
 
+use crate::bridge::free_endpoint;
 use crate::command::{GRIDWEAVE, Running, run, wait_until};
 use std::collections::BTreeMap;
 use std::fs;
-use std::net::TcpListener;
 use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
 use tempfile::TempDir;
@@ -46,11 +46,6 @@ const NEVER_MISSED: usize = 60;
 fn own_name(what: &str) -> String {
     static NEXT: AtomicU32 = AtomicU32::new(0);
     format!("{what}_{}_{}", std::process::id(), NEXT.fetch_add(1, Ordering::Relaxed))
-}
-
-fn free_endpoint() -> String {
-    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-    format!("tcp/127.0.0.1:{port}")
 }
 
 /// So many seconds of a drive are one log.
@@ -218,7 +213,7 @@ pub(crate) fn log_base(robot: &Robot, base: &str, endpoint: &str, log: &str) -> 
 #[test]
 fn a_run_that_is_carried_to_a_base_ends_in_the_same_map_as_where_it_was() {
     let mut robot = Robot::start();
-    let endpoint = free_endpoint();
+    let endpoint = free_endpoint().0;
     let pipeline = Path::new(env!("CARGO_MANIFEST_DIR")).join("../bridge/bridge_base.toml");
     let listen = format!("robots.listen=[\"{endpoint}\"]");
     let args = ["run", pipeline.to_str().unwrap(), "--output", "base.mcap", "--summary", "summary.json"];
@@ -246,7 +241,7 @@ fn a_run_that_is_carried_to_a_base_ends_in_the_same_map_as_where_it_was() {
 #[test]
 fn a_restart_of_a_killed_base_is_reported_and_it_gets_later_messages() {
     let mut robot = Robot::start();
-    let endpoint = free_endpoint();
+    let endpoint = free_endpoint().0;
     let (first_name, first) = log_base(&robot, BASE, &endpoint, "first.mcap");
     let mut bridge = robot.bridge(&endpoint, &["-v"]);
     robot.play(0);
@@ -296,7 +291,7 @@ fn a_restart_of_a_killed_base_is_reported_and_it_gets_later_messages() {
 #[test]
 fn top_at_the_base_shows_the_stages_of_the_robot_with_its_name() {
     let mut robot = Robot::start();
-    let endpoint = free_endpoint();
+    let endpoint = free_endpoint().0;
     let (name, mut base) =
         log_base(&robot, &BASE.replace("robots.tags\"", "robots.tags\", \"robots.stages\""), &endpoint, "base.mcap");
     let mut bridge = robot.bridge(&endpoint, &["--set", "report_stages=0.1"]);
@@ -337,7 +332,7 @@ fn top_at_the_base_shows_the_stages_of_the_robot_with_its_name() {
 #[test]
 fn without_a_base_a_bridge_says_so_and_ends_with_status_1() {
     let mut robot = Robot::start();
-    let endpoint = free_endpoint();
+    let endpoint = free_endpoint().0;
     let mut bridge = robot.bridge(&endpoint, &["--set", "linger=0.1"]);
     robot.play(0);
     bridge.wait_for(&format!("there is no receiver of the bridge `base` at {endpoint} ({endpoint}: "));

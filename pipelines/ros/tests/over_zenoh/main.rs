@@ -14,4 +14,5 @@ mod scans;
 mod stages;
 #[cfg(feature = "tls")]
 mod tls;
+mod waiting;
 mod wire;

@@ -1,6 +1,7 @@
 //! What programs have of a map whose changes the sink publishes, over a router on this machine.
 
-use crate::stages::{give, sent, sink, source_with, wait_until_heard};
+use crate::stages::{sink, source_with, wait_until_heard};
+use crate::waiting::{give, sent};
 use crate::wire::{Robot, Router, TopicSubscriber, WATCHDOG, topic};
 use gridweave_ros::qos::Qos;
 use gridweave_runtime::ros::{Header, MapMetaData, OccupancyGrid, OccupancyGridUpdate, RosMessage, decode, encode};

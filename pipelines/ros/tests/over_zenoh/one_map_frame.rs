@@ -1,6 +1,7 @@
 //! Robots whose maps are all in one frame, `map`, as where the SLAM of each is told no frame of its own.
 
-use crate::stages::{map, sent, source_with, wait_until_heard};
+use crate::stages::{map, source_with, wait_until_heard};
+use crate::waiting::sent;
 use crate::wire::{Robot, Router, topic};
 use gridweave_ros::qos::Qos;
 use gridweave_runtime::message::LogTime;

@@ -1,6 +1,7 @@
 //! Scans of robots that publish no map, taken by the source over a router on this machine.
 
-use crate::stages::{map, sent, wait_until_heard};
+use crate::stages::{map, wait_until_heard};
+use crate::waiting::{sent, wait_for};
 use crate::wire::{Robot, Router, Sender, WATCHDOG, topic};
 use gridweave_ros::qos::Qos;
 use gridweave_runtime::message::{LogTime, Message, MessageFlags};
@@ -37,17 +38,14 @@ fn scan() -> Vec<u8> {
 /// Sends until a message comes out on an output: what is sent before all is known that it needs is left out.
 #[track_caller]
 fn first_of(source: &mut StageHarness, output: &str, mut send: impl FnMut()) -> Message {
-    let until = Instant::now() + WATCHDOG;
-    loop {
-        assert!(Instant::now() < until, "nothing came on {output}: {:?}", source.warnings());
+    let mut first = None;
+    wait_for(source, output, |source| {
         send();
-        source.node().wait(Duration::from_millis(20));
-        source.node().advance().unwrap();
         let is_data = |message: &Message| message.header().flags.contains(MessageFlags::DATA);
-        if let Some(message) = source.take_messages(output).into_iter().find(is_data) {
-            return message;
-        }
-    }
+        first = source.take_messages(output).into_iter().find(is_data);
+        first.is_some()
+    });
+    first.unwrap()
 }
 
 #[test]
@@ -149,10 +147,5 @@ fn a_pipeline_that_reads_no_scans_asks_for_none() {
 /// Lets a source go on until it hears what is published no longer.
 #[track_caller]
 fn wait_until_not_heard(source: &mut StageHarness, sender: &Sender) {
-    let until = Instant::now() + WATCHDOG;
-    while sender.is_heard() {
-        assert!(Instant::now() < until, "the source still subscribes");
-        source.node().wait(Duration::from_millis(20));
-        source.node().advance().unwrap();
-    }
+    wait_for(source, "end of the subscription", |_| !sender.is_heard());
 }

@@ -1,15 +1,16 @@
 //! The stages by themselves against sessions of Zenoh that do what nodes of ROS 2 do, over a router on this machine.
 
+use crate::waiting::{give, sent, wait_for, warned};
 use crate::wire::{Robot, Router, Sender, WATCHDOG, topic};
 use gridweave_ros::qos::Qos;
-use gridweave_runtime::message::{FixedText, LogTime, Message, MessageFlags, MessageHeader};
+use gridweave_runtime::message::LogTime;
 use gridweave_runtime::pipeline::{Mode, Overrides, Pipeline};
 use gridweave_runtime::ros::{
     Header, MapMetaData, MarkerArray, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, RobotFrame, RobotFrames,
     RosMessage, TFMessage, TransformStamped, Vector3, decode, encode,
 };
 use gridweave_runtime::stage::{Context, InputWire, StageHarness};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 pub(crate) fn map(robot: &str, occupied: u8) -> Vec<u8> {
     let info = MapMetaData { width: 2, height: 1, resolution: 0.05, ..Default::default() };
@@ -25,44 +26,10 @@ pub(crate) fn source_with(router: &Router, parameters: &str) -> StageHarness {
     StageHarness::new(&gridweave_ros::source::kind(), &format!("{}\n{parameters}", router.parameters())).unwrap()
 }
 
-/// Lets a source go on until it has sent so many messages on an output, and gives them.
-#[track_caller]
-pub(crate) fn sent(source: &mut StageHarness, output: &str, count: usize) -> Vec<Message> {
-    let (mut messages, until) = (Vec::new(), Instant::now() + WATCHDOG);
-    while messages.len() < count {
-        assert!(Instant::now() < until, "{} of {count} came on {output}: {:?}", messages.len(), source.warnings());
-        source.node().wait(Duration::from_millis(20));
-        assert!(source.node().advance().unwrap());
-        // Before the first message its channel is announced.
-        let is_data = |message: &Message| message.header().flags.contains(MessageFlags::DATA);
-        messages.extend(source.take_messages(output).into_iter().filter(is_data));
-    }
-    messages
-}
-
 /// Lets a source go on until it hears what is published.
 #[track_caller]
 pub(crate) fn wait_until_heard(source: &mut StageHarness, sender: &Sender) {
-    let until = Instant::now() + WATCHDOG;
-    while !sender.is_heard() {
-        assert!(Instant::now() < until, "the source does not subscribe");
-        source.node().wait(Duration::from_millis(20));
-        source.node().advance().unwrap();
-    }
-}
-
-/// Lets a source go on until it has warned of something, and gives that.
-#[track_caller]
-fn warned(source: &mut StageHarness, of: &str) -> String {
-    let until = Instant::now() + WATCHDOG;
-    loop {
-        assert!(Instant::now() < until, "no warning of {of}: {:?}", source.warnings());
-        source.node().wait(Duration::from_millis(20));
-        source.node().advance().unwrap();
-        if let Some(text) = source.warnings().into_keys().find(|text| text.contains(of)) {
-            return text;
-        }
-    }
+    wait_for(source, "subscription", |_| sender.is_heard());
 }
 
 /// A sink of this run with wires that carry messages of these types on these topics.
@@ -76,12 +43,6 @@ pub(crate) fn sink(parameters: &str, wires: &[(&'static str, &str)]) -> StageHar
     };
     let context = Context { stage: "ros".into(), inputs: wires.iter().map(wire).collect(), ..Default::default() };
     StageHarness::with_context(&gridweave_ros::sink::kind(), parameters, &context).unwrap()
-}
-
-pub(crate) fn give(sink: &mut StageHarness, wire: usize, topic: &str, bytes: Vec<u8>) {
-    let topic = FixedText::new(topic).unwrap();
-    let message = Message::from_vec(MessageHeader { topic, ..Default::default() }, bytes);
-    sink.give_message("in", message.on_wire(wire)).unwrap();
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! Bridges over TLS, with certificates of authorities that the tests make.
 
-use crate::bridge::{Wire, come, give, give_pose, map, sink, source};
+use crate::bridge::{Wire, give, give_pose, map, sink, source};
 use crate::bridge_tap::{Link, go_on, robot, tap_stage, times};
 use crate::command::{GRIDWEAVE, Running, wait_until};
+use crate::waiting::sent;
 use gridweave_runtime::message::Message;
 use gridweave_runtime::stage::StageHarness;
 use rcgen::{BasicConstraints, CertificateParams, DnType, IsCa, Issuer, KeyPair};
@@ -82,7 +83,7 @@ fn what_goes_over_tls_comes_as_it_was_sent_and_cannot_be_read_on_its_way() {
         for (time, bytes) in (1..).zip(&maps) {
             give(&mut sink, 0, "robot1", "/robot1/map", time, bytes.clone());
         }
-        let came = come(&mut source, "map", 3);
+        let came = sent(&mut source, "map", 3);
         assert!(came.iter().map(Message::bytes).eq(maps.iter().map(Vec::as_slice)), "{protocol}");
         assert_eq!(is_readable(&wire, "sender/robot-1"), protocol == "tcp", "{of_robot}");
     }
