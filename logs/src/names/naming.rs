@@ -52,22 +52,13 @@ pub(super) fn name(
     let shown = match rules.convention {
         TopicNaming::AsLogged => ShownRobots::default(),
         TopicNaming::ByRobot => {
-            let mut channels: Vec<Vec<NumberedChannel<'_>>> = vec![Vec::new(); inputs.len()];
-            for Draft { file, number, channel, .. } in &drafts {
-                if let Some(of_input) = input_of.get(*file).and_then(|&input| channels.get_mut(input)) {
-                    of_input.push(((*file, *number), channel));
-                }
-            }
+            let channels: Vec<Vec<NumberedChannel<'_>>> =
+                of_inputs(&drafts, input_of, inputs.len(), |draft| ((draft.file, draft.number), &draft.channel));
             ShownRobots::find(files, input_of, inputs, &channels, &rules.robots, robots)
         }
     };
     name_by_frames(&mut drafts, input_of, &shown, robots);
-    let mut of_inputs: Vec<Vec<&Channel>> = vec![Vec::new(); inputs.len()];
-    for Draft { file, channel, .. } in &drafts {
-        if let Some(of_input) = input_of.get(*file).and_then(|&input| of_inputs.get_mut(input)) {
-            of_input.push(channel);
-        }
-    }
+    let of_inputs: Vec<Vec<&Channel>> = of_inputs(&drafts, input_of, inputs.len(), |draft| &draft.channel);
     let (of_input, note) = match rules.convention {
         TopicNaming::AsLogged => (inputs.iter().map(|input| input.robot.clone()).collect(), None),
         TopicNaming::ByRobot => infer_robots(inputs, &of_inputs, robots, &shown)?,
@@ -89,17 +80,7 @@ pub(super) fn name(
     }
     let mut known = known_robots(&roles, &drafts);
     known.extend(robots_with_unread_maps(drafts.iter().map(|draft| &draft.channel), &roles, &robots.map).into_keys());
-    if let Some(unknown) = rules.robots.iter().find(|robot| !known.contains(robot.as_str())) {
-        return Err(NameError::NoSuchRobot { robot: unknown.clone(), known: known.into_iter().collect() });
-    }
-    if let Some(unknown) =
-        rules.topics.iter().find(|topic| !drafts.iter().any(|draft| fits(topic, &draft.channel.topic)))
-    {
-        let known: BTreeSet<&str> = drafts.iter().map(|draft| draft.channel.topic.as_str()).collect();
-        let known = known.into_iter().map(str::to_owned).collect();
-        let renamed = rules.renamed(unknown);
-        return Err(NameError::NoSuchTopic { topic: unknown.clone(), renamed, known });
-    }
+    check_wanted(rules, &known, &drafts)?;
     let mut channels: Vec<BTreeMap<u16, NamedChannel>> = files.iter().map(|_| BTreeMap::new()).collect();
     let mut recoders = Recoders::default();
     for Draft { file, number, channel, robot, .. } in drafts {
@@ -119,6 +100,38 @@ pub(super) fn name(
     }
     let given = inputs.iter().filter_map(|input| input.robot.clone()).chain(rules.robots.iter().cloned()).collect();
     Ok(Names { channels, robots: robot_of_file, note, given })
+}
+
+/// Something of every channel, by the input that it belongs to.
+fn of_inputs<'a, T>(
+    drafts: &'a [Draft],
+    input_of: &[usize],
+    inputs: usize,
+    of: impl Fn(&'a Draft) -> T,
+) -> Vec<Vec<T>> {
+    let mut of_inputs: Vec<Vec<T>> = (0..inputs).map(|_| Vec::new()).collect();
+    for draft in drafts {
+        if let Some(of_input) = input_of.get(draft.file).and_then(|&input| of_inputs.get_mut(input)) {
+            of_input.push(of(draft));
+        }
+    }
+    of_inputs
+}
+
+/// The robots and topics that the user selects must exist.
+fn check_wanted(rules: &NameRules, known: &BTreeSet<String>, drafts: &[Draft]) -> Result<(), NameError> {
+    if let Some(unknown) = rules.robots.iter().find(|robot| !known.contains(robot.as_str())) {
+        return Err(NameError::NoSuchRobot { robot: unknown.clone(), known: known.iter().cloned().collect() });
+    }
+    if let Some(unknown) =
+        rules.topics.iter().find(|topic| !drafts.iter().any(|draft| fits(topic, &draft.channel.topic)))
+    {
+        let known: BTreeSet<&str> = drafts.iter().map(|draft| draft.channel.topic.as_str()).collect();
+        let known = known.into_iter().map(str::to_owned).collect();
+        let renamed = rules.renamed(unknown);
+        return Err(NameError::NoSuchTopic { topic: unknown.clone(), renamed, known });
+    }
+    Ok(())
 }
 
 /// The channels of all files, with the user's renames applied. Where robots are looked for, channels without messages

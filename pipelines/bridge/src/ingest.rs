@@ -77,88 +77,88 @@ impl Ingest {
 
     /// Takes a batch. Returns its contents, and the answer to send once these were forwarded.
     pub(super) fn take(&mut self, bytes: &[u8]) -> (Taken, Answer) {
-        let receiver = self.receiver;
-        let answer = |number, outcome, text: &str| Answer {
-            receiver,
-            number,
-            outcome,
-            came: 0,
-            answered: 0,
-            text: text.to_owned(),
-        };
-        let batch: Batch = match from_bytes(bytes) {
-            Ok(batch) => batch,
-            Err(wrong) => {
-                let answer = answer(0, Outcome::Unreadable, &wrong);
-                return (Taken { wrong: Some(wrong), ..Default::default() }, answer);
+        let mut taken = Taken::default();
+        let (number, outcome) = match from_bytes::<Batch>(bytes) {
+            Ok(batch) => {
+                (taken.sender, taken.session) = (batch.sender.clone(), batch.session);
+                (batch.number, self.take_batch(batch, &mut taken))
             }
+            Err(wrong) => (0, Err(wrong)),
         };
-        let number = batch.number;
-        let mut taken = Taken { sender: batch.sender.clone(), session: batch.session, ..Default::default() };
+        taken.wrong = outcome.as_ref().err().cloned();
+        let text = taken.wrong.clone().unwrap_or_default();
+        let outcome = outcome.unwrap_or(Outcome::Unreadable);
+        (taken, Answer { receiver: self.receiver, number, outcome, came: 0, answered: 0, text })
+    }
+
+    /// Puts the contents of a batch into `taken`. The error is why the batch cannot be taken.
+    fn take_batch(&mut self, batch: Batch, taken: &mut Taken) -> Result<Outcome, String> {
         let known = self.senders.get(&batch.session).map(|sender| (sender.handshake, sender.next));
         // A delayed batch was taken before, or its messages were sent again after a restart.
-        if known.is_some_and(|known| (batch.handshake, number) < known) {
-            return (taken, answer(number, Outcome::Taken, ""));
+        if known.is_some_and(|known| (batch.handshake, batch.number) < known) {
+            return Ok(Outcome::Taken);
         }
-        let kept = self.kept();
-        if number == 0 {
-            let links_size: usize = batch.links.iter().map(|link| link.port.len() + link.ros_type.len() + LINK).sum();
-            let is_new = known.is_none();
-            if (is_new && self.senders.len() >= MAX_SENDERS) || kept.saturating_add(links_size) > MAX_KEPT {
-                let wrong = "there are too many senders, or they have too many links".to_owned();
-                let answer = answer(number, Outcome::Unreadable, &wrong);
-                taken.wrong = Some(wrong);
-                return (taken, answer);
-            }
-            let links = batch.links.into_iter().map(Arc::new).collect();
-            let before = self.senders.remove(&batch.session).unwrap_or_default();
-            let Sender { correction, dropped, .. } = before;
-            let known = BTreeMap::new();
-            let sender = Sender { links, handshake: batch.handshake, next: 1, correction, dropped, known };
-            self.senders.insert(batch.session, sender);
-            return (taken, answer(number, Outcome::Taken, ""));
+        if batch.number == 0 {
+            return self.take_handshake(batch);
         }
-        let is_next = known == Some((batch.handshake, number)) && batch.receiver == self.receiver;
+        let room = MAX_KEPT.saturating_sub(self.kept());
+        let is_next = known == Some((batch.handshake, batch.number)) && batch.receiver == self.receiver;
         let Some(sender) = self.senders.get_mut(&batch.session).filter(|_| is_next) else {
-            return (taken, answer(number, Outcome::Unknown, ""));
+            return Ok(Outcome::Unknown);
         };
-        let (dropped, is_end, offset) = (batch.dropped, batch.is_end, batch.clock_offset);
+        let offset = batch.clock_offset;
         if offset.saturating_sub(sender.correction).saturating_abs() > self.tolerance {
             sender.correction = if offset.saturating_abs() > self.tolerance { offset } else { 0 };
             taken.clock = Some(sender.correction);
         }
-        match sender.items(batch.entries, MAX_KEPT.saturating_sub(kept)) {
+        match sender.items(batch.entries, room) {
             Ok(items) => {
                 sender.next += 1;
-                (taken.items, taken.is_end) = (items, is_end);
-                taken.dropped = dropped.saturating_sub(std::mem::replace(&mut sender.dropped, dropped));
-                (taken, answer(number, Outcome::Taken, ""))
+                (taken.items, taken.is_end) = (items, batch.is_end);
+                taken.dropped = batch.dropped.saturating_sub(std::mem::replace(&mut sender.dropped, batch.dropped));
+                Ok(Outcome::Taken)
             }
             Err(wrong) => {
                 // The state of the sender is incomplete.
                 self.senders.remove(&batch.session);
-                let answer = answer(number, Outcome::Unreadable, &wrong);
-                taken.wrong = Some(wrong);
-                (taken, answer)
+                Err(wrong)
             }
         }
     }
-}
 
-/// The memory of a link or of a kept message beside its texts and bytes, roughly.
-const LINK: usize = 64;
+    /// Stores the links of a sender, from the first batch of a handshake.
+    fn take_handshake(&mut self, batch: Batch) -> Result<Outcome, String> {
+        let links_size: usize = batch.links.iter().map(size_of).sum();
+        let is_new = !self.senders.contains_key(&batch.session);
+        if (is_new && self.senders.len() >= MAX_SENDERS) || self.kept().saturating_add(links_size) > MAX_KEPT {
+            return Err("there are too many senders, or they have too many links".to_owned());
+        }
+        let links = batch.links.into_iter().map(Arc::new).collect();
+        let Sender { correction, dropped, .. } = self.senders.remove(&batch.session).unwrap_or_default();
+        let known = BTreeMap::new();
+        let sender = Sender { links, handshake: batch.handshake, next: 1, correction, dropped, known };
+        self.senders.insert(batch.session, sender);
+        Ok(Outcome::Taken)
+    }
 
-impl Ingest {
     /// The number of bytes that are kept for all senders.
     fn kept(&self) -> usize {
         self.senders.values().map(Sender::kept).sum()
     }
 }
 
+/// The memory of a link or of a kept message beside its texts and bytes, roughly.
+const LINK: usize = 64;
+
+/// The number of bytes that a link takes.
+fn size_of(link: &Link) -> usize {
+    link.port.len() + link.ros_type.len() + LINK
+}
+
 impl Sender {
     /// The number of bytes that are kept.
     fn kept(&self) -> usize {
-        let links: usize = self.links.iter().map(|link| link.port.len() + link.ros_type.len() + LINK).sum();
+        let links: usize = self.links.iter().map(|link| size_of(link)).sum();
         links + self.known.iter().map(|((_, topic), bytes)| topic.len() + bytes.len() + LINK).sum::<usize>()
     }
 
