@@ -164,27 +164,7 @@ impl RobotSurvey {
         }
         let Some(info) = self.robots.get_mut(robot) else { return };
         match role {
-            Role::Map => {
-                let Ok(map) = decode::<OccupancyGrid<'_>>(data) else {
-                    *self.unreadable.entry(topic.to_owned()).or_default() += 1;
-                    return;
-                };
-                if !self.map_frames.contains_key(robot) {
-                    self.map_frames.insert(robot.to_owned(), (topic.to_owned(), map.header.frame_id.clone()));
-                }
-                for (peculiarity, text) in peculiarities(data, CellValues::Auto, info.maps) {
-                    let note = || format!("maps on `{topic}`: {text}");
-                    self.peculiarities.entry((topic.to_owned(), peculiarity)).or_insert_with(note);
-                }
-                info.maps += 1;
-                if let Err(error) = map.check() {
-                    let (_, count) = self.unusable_maps.entry(robot.to_owned()).or_insert((error, 0));
-                    *count += 1;
-                }
-                if self.inferred.asks_for_map(robot) {
-                    self.inferred.set_map_frame(robot, &map.header.frame_id);
-                }
-            }
+            Role::Map => self.take_map(robot, topic, data),
             Role::MapUpdate => info.map_updates += 1,
             Role::Scan => info.scans += 1,
             Role::Pose(_) => {
@@ -197,7 +177,7 @@ impl RobotSurvey {
                     Ok(_) => {
                         self.odometry.entry(robot.to_owned()).or_insert_with(|| topic.to_owned());
                     }
-                    Err(_) => *self.unreadable.entry(topic.to_owned()).or_default() += 1,
+                    Err(_) => self.count_unreadable(topic),
                 }
             }
             Role::Tags => {
@@ -208,7 +188,7 @@ impl RobotSurvey {
                         self.notes.extend(note.map(|note| format!("tags on `{topic}`: {note}")));
                         *info.tags.entry(reading.tag_id).or_default() += 1;
                     }
-                    Err(_) => *self.unreadable.entry(topic.to_owned()).or_default() += 1,
+                    Err(_) => self.count_unreadable(topic),
                 }
             }
             Role::TagMessage => match self.tag_readers.get(topic).map(|reader| reader.read(robot, data)) {
@@ -218,11 +198,36 @@ impl RobotSurvey {
                         *info.tags.entry(reading.tag_id).or_default() += 1;
                     }
                 }
-                Some(Err(_)) => *self.unreadable.entry(topic.to_owned()).or_default() += 1,
+                Some(Err(_)) => self.count_unreadable(topic),
                 None => {}
             },
             Role::Topology | Role::Tf | Role::Other => {}
         }
+    }
+
+    fn take_map(&mut self, robot: &str, topic: &str, data: &[u8]) {
+        let Ok(map) = decode::<OccupancyGrid<'_>>(data) else { return self.count_unreadable(topic) };
+        let Some(info) = self.robots.get_mut(robot) else { return };
+        if !self.map_frames.contains_key(robot) {
+            self.map_frames.insert(robot.to_owned(), (topic.to_owned(), map.header.frame_id.clone()));
+        }
+        for (peculiarity, text) in peculiarities(data, CellValues::Auto, info.maps) {
+            let note = || format!("maps on `{topic}`: {text}");
+            self.peculiarities.entry((topic.to_owned(), peculiarity)).or_insert_with(note);
+        }
+        info.maps += 1;
+        if let Err(error) = map.check() {
+            let (_, count) = self.unusable_maps.entry(robot.to_owned()).or_insert((error, 0));
+            *count += 1;
+        }
+        if self.inferred.asks_for_map(robot) {
+            self.inferred.set_map_frame(robot, &map.header.frame_id);
+        }
+    }
+
+    /// Counts a message that cannot be decoded.
+    fn count_unreadable(&mut self, topic: &str) {
+        *self.unreadable.entry(topic.to_owned()).or_default() += 1;
     }
 
     /// Adds a number of unread messages with the given role, robot and topic.
@@ -241,10 +246,7 @@ impl RobotSurvey {
     }
 
     fn take_tf(&mut self, prefix: &str, topic: &str, data: &[u8]) {
-        let Ok(message) = decode::<TFMessage>(data) else {
-            *self.unreadable.entry(topic.to_owned()).or_default() += 1;
-            return;
-        };
+        let Ok(message) = decode::<TFMessage>(data) else { return self.count_unreadable(topic) };
         self.merged_maps.add_transforms(&message);
         self.inferred.odometry(prefix, is_static(topic), &message);
         let (poses, _) = match &mut self.tf {

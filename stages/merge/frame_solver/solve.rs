@@ -76,21 +76,33 @@ pub fn solve(
     let used = used.map(|((_, edge), pair)| ((*pair).clone(), edge.transform_a_b)).collect();
 
     let frames = place(&names, &right, root);
-    let mut tied: BTreeSet<usize> = right.iter().flat_map(|edge| [edge.a, edge.b]).collect();
-    let mut groups = Vec::new();
     let references = before.groups.iter().filter_map(|group| index_of(&group.reference));
-    tied.retain(|&robot| !frames.contains_key(names[robot]));
+    let groups = other_groups(&names, &right, &frames, references);
+    let mut solution = Solution { frames, groups, disputed, left_out, used, ..Solution::default() };
+    solution.unmerged = reasons::unmerged(robots, &solution, alignments);
+    solution
+}
+
+/// The groups of robots without a frame that edges connect with each other. Their references are `references`, if they
+/// are among them, and else the first.
+fn other_groups(
+    names: &[&str],
+    edges: &[Edge],
+    placed: &BTreeMap<String, UncertainPose>,
+    references: impl Iterator<Item = usize>,
+) -> Vec<Group> {
+    let mut tied: BTreeSet<usize> = edges.iter().flat_map(|edge| [edge.a, edge.b]).collect();
+    tied.retain(|&robot| !placed.contains_key(names[robot]));
+    let mut groups = Vec::new();
     for root in references.chain(tied.clone()) {
         if tied.contains(&root) {
-            let frames = place(&names, &right, root);
+            let frames = place(names, edges, root);
             tied.retain(|&robot| !frames.contains_key(names[robot]));
             groups.push(Group { reference: names[root].to_owned(), frames });
         }
     }
     groups.sort_by(|one, other| one.reference.cmp(&other.reference));
-    let mut solution = Solution { frames, groups, disputed, left_out, used, ..Solution::default() };
-    solution.unmerged = reasons::unmerged(robots, &solution, alignments);
-    solution
+    groups
 }
 
 /// `T_root_robot` for all robots that the edges connect with the root.

@@ -119,56 +119,53 @@ pub enum Refusal {
     },
 }
 
+/// One line for maps that may agree by chance, by the term which is the weakest.
+fn chance(agreement: &Agreement, weakest: Term) -> String {
+    let Agreement { inlier_length, conflict_length, independent_share, .. } = agreement;
+    if agreement.constraints == 0 {
+        return format!("{inlier_length:.0} m of wall agree, but all are parallel: the position along them is open");
+    }
+    match weakest {
+        Term::Constraints if *independent_share < LITTLE_ELSE => {
+            let fixing = (1.0 - independent_share) * inlier_length;
+            format!(
+                "{inlier_length:.0} m of wall agree, but {fixing:.0} m of them are one corner, which many rooms have"
+            )
+        }
+        Term::PeakSignificance => {
+            format!("{inlier_length:.0} m of wall agree, and nearly as much at other poses: it may be chance")
+        }
+        Term::MarginOverChance => {
+            format!("{inlier_length:.0} m of wall agree, which is little more than walls like these do by chance")
+        }
+        _ => format!("{inlier_length:.0} m of wall agree and {conflict_length:.0} m contradict, which may be chance"),
+    }
+}
+
+/// One line for maps that contradict each other.
+fn contradiction(agreement: &Agreement) -> String {
+    if agreement.details.contradict() && agreement.inlier_ratio() >= MOST_OF_THE_WALLS {
+        let WallLengths { inlier, conflict } = agreement.details.segments;
+        return format!(
+            "the long walls agree, but of furniture and short walls {inlier:.0} m do, {conflict:.0} m do not"
+        );
+    }
+    let Agreement { inlier_length, conflict_length, .. } = agreement;
+    format!("the maps contradict each other: {inlier_length:.0} m of wall agree, {conflict_length:.0} m do not")
+}
+
 impl Refusal {
     /// One line for the user; the whole reason if an earlier stage has refused it.
     pub fn headline(&self) -> String {
         match self {
             Self::RefusedUpstream(reason) => reason.clone(),
-            Self::Chance { agreement, .. } if agreement.inlier_length < LITTLE_WALL => {
-                "at no pose do the maps agree on more than a few metres of wall".to_owned()
-            }
-            Self::Chance { agreement, .. } if agreement.constraints == 0 => {
-                format!(
-                    "{:.0} m of wall agree, but all are parallel: the position along them is open",
-                    agreement.inlier_length
-                )
-            }
-            Self::Chance { agreement, weakest: Term::Constraints, .. } if agreement.independent_share < LITTLE_ELSE => {
-                let Agreement { inlier_length, independent_share, .. } = agreement;
-                let fixing = (1.0 - independent_share) * inlier_length;
-                format!(
-                    "{inlier_length:.0} m of wall agree, but {fixing:.0} m of them are one corner, which many rooms have"
-                )
-            }
-            Self::Chance { agreement, weakest: Term::PeakSignificance, .. } => {
-                let Agreement { inlier_length, .. } = agreement;
-                format!("{inlier_length:.0} m of wall agree, and nearly as much at other poses: it may be chance")
-            }
-            Self::Chance { agreement, weakest: Term::MarginOverChance, .. } => {
-                let Agreement { inlier_length, .. } = agreement;
-                format!("{inlier_length:.0} m of wall agree, which is little more than walls like these do by chance")
-            }
-            Self::Chance { agreement, .. } => {
-                let Agreement { inlier_length, conflict_length, .. } = agreement;
-                format!("{inlier_length:.0} m of wall agree and {conflict_length:.0} m contradict, which may be chance")
-            }
-            Self::Contradiction { agreement } if agreement.inlier_length < LITTLE_WALL => {
-                "at no pose do the maps agree on more than a few metres of wall".to_owned()
-            }
-            Self::Contradiction { agreement }
-                if agreement.details.contradict() && agreement.inlier_ratio() >= MOST_OF_THE_WALLS =>
+            Self::Chance { agreement, .. } | Self::Contradiction { agreement }
+                if agreement.inlier_length < LITTLE_WALL =>
             {
-                let WallLengths { inlier, conflict } = agreement.details.segments;
-                format!(
-                    "the long walls agree, but of furniture and short walls {inlier:.0} m do, {conflict:.0} m do not"
-                )
+                "at no pose do the maps agree on more than a few metres of wall".to_owned()
             }
-            Self::Contradiction { agreement } => {
-                let Agreement { inlier_length, conflict_length, .. } = agreement;
-                format!(
-                    "the maps contradict each other: {inlier_length:.0} m of wall agree, {conflict_length:.0} m do not"
-                )
-            }
+            Self::Chance { agreement, weakest, .. } => chance(agreement, *weakest),
+            Self::Contradiction { agreement } => contradiction(agreement),
             Self::Ambiguous { listed: Listed(all), .. } if all.len() > 1 => {
                 format!("the maps fit at {} poses, and the evidence does not decide which is right", all.len())
             }
