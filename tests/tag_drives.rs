@@ -11,7 +11,7 @@ use gridweave_runtime::ros::{PoseStamped, TFMessage, Transform, TransformStamped
 use nalgebra::{Isometry2, Point2, Vector2};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, Normal};
+use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Metres a second.
@@ -65,31 +65,27 @@ pub struct TagDrive {
     pub seed: u64,
 }
 
+/// The place of the camera on the robot, metres.
+const CAMERA: Vector2<f64> = Vector2::new(0.1, 0.0);
+
+/// The pose of the antennas on the robot.
+fn antennas() -> Isometry2<f64> {
+    Isometry2::new(Vector2::new(-0.2, 0.1), FRAC_PI_2)
+}
+
+/// A transform from one frame to another.
+fn transform(seconds: f64, [parent, child]: [String; 2], transform: Transform) -> TFMessage {
+    TFMessage {
+        transforms: vec![TransformStamped { header: header(seconds, parent), child_frame_id: child, transform }],
+    }
+}
+
 impl TagDrive {
     /// Writes the poses of the robot and its measurements of tags, which are named by their number.
     pub fn write(&self, log: &mut LogBuilder, tags: &[Point2<f64>]) {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        let noise = Normal::new(0.0, 1.0).unwrap();
         let robot = self.robot;
-        if matches!(self.sense, Sense::Camera { .. }) {
-            let topic = format!("/{robot}/camera/tags");
-            log.raw(0.0, &topic, "apriltag_msgs/msg/AprilTagDetectionArray", &[0, 1, 0, 0]);
-            let mount = TransformStamped {
-                header: header(0.0, format!("{robot}/base_link")),
-                child_frame_id: format!("{robot}/camera"),
-                transform: Isometry2::translation(0.1, 0.0).into(),
-            };
-            log.message(0.0, "/tf_static", &TFMessage { transforms: vec![mount] });
-        }
-        let antennas = Isometry2::new(Vector2::new(-0.2, 0.1), FRAC_PI_2);
-        if matches!(self.sense, Sense::Bearings { .. }) {
-            let mount = TransformStamped {
-                header: header(0.0, format!("{robot}/base_link")),
-                child_frame_id: format!("{robot}/antennas"),
-                transform: antennas.into(),
-            };
-            log.message(0.0, "/tf_static", &TFMessage { transforms: vec![mount] });
-        }
+        self.write_sensor(log);
         let mut place = Point2::from(self.start.translation.vector);
         let mut odometry = Isometry2::identity();
         let mut heading = self.start.rotation.angle();
@@ -100,7 +96,7 @@ impl TagDrive {
                 let turn = step.y.atan2(step.x) - heading;
                 heading += turn;
                 place += step;
-                let error = self.drift * step.norm().sqrt() * noise.sample(&mut random);
+                let error = self.drift * step.norm().sqrt() * noise(&mut random);
                 odometry = odometry * Isometry2::rotation(turn + error) * Isometry2::translation(step.norm(), 0.0);
                 seconds += TICK;
                 let pose = PoseStamped { header: header(seconds, format!("{robot}/map")), pose: odometry.into() };
@@ -108,44 +104,70 @@ impl TagDrive {
                 let base = Isometry2::new(place.coords, heading);
                 for (number, tag) in tags.iter().enumerate() {
                     let seen = base.inverse() * tag;
-                    let distance = seen.coords.norm();
-                    if distance > self.reach {
-                        continue;
-                    }
-                    match self.sense {
-                        Sense::Ranges { stddev, outliers } => {
-                            let longer =
-                                if random.random::<f64>() < outliers { 5.0 * random.random::<f64>() } else { 0.0 };
-                            let range = (distance + stddev * noise.sample(&mut random) + longer).max(0.01);
-                            log.reading(seconds, robot, &format!("beacon{number}"), range);
-                        }
-                        Sense::Bearings { stddev, outliers } => {
-                            let from_antennas = antennas.inverse() * seen;
-                            let any = random.random::<f64>() < outliers;
-                            let turn =
-                                if any { TAU * random.random::<f64>() } else { stddev * noise.sample(&mut random) };
-                            let bearing = from_antennas.y.atan2(from_antennas.x) + turn;
-                            let header = header(seconds, format!("{robot}/antennas"));
-                            let none = Vec::<f64>::new();
-                            let name = vec![format!("tag{number}")];
-                            let reading = (header, name, vec![-bearing.to_degrees()], none.clone(), none);
-                            let bytes = encode(&reading).unwrap();
-                            log.raw(seconds, &format!("/{robot}/directions"), "sensor_msgs/msg/JointState", &bytes);
-                        }
-                        Sense::Camera { stddev } => {
-                            let error = Vector2::new(noise.sample(&mut random), noise.sample(&mut random));
-                            let seen = seen.coords + error * stddev * distance - Vector2::new(0.1, 0.0);
-                            let translation = Vector3 { x: seen.x, y: seen.y, z: 0.2 };
-                            let tag = TransformStamped {
-                                header: header(seconds, format!("{robot}/camera")),
-                                child_frame_id: format!("tag36h11:{number}"),
-                                transform: Transform { translation, ..Default::default() },
-                            };
-                            log.message(seconds, "/tf", &TFMessage { transforms: vec![tag] });
-                        }
+                    if seen.coords.norm() <= self.reach {
+                        self.write_measurement(log, seconds, number, seen, &mut random);
                     }
                 }
             }
         }
     }
+
+    /// Writes where the sensor is on the robot.
+    fn write_sensor(&self, log: &mut LogBuilder) {
+        let robot = self.robot;
+        let (name, pose) = match self.sense {
+            Sense::Ranges { .. } => return,
+            Sense::Bearings { .. } => ("antennas", antennas()),
+            Sense::Camera { .. } => {
+                let topic = format!("/{robot}/camera/tags");
+                log.raw(0.0, &topic, "apriltag_msgs/msg/AprilTagDetectionArray", &[0, 1, 0, 0]);
+                ("camera", Isometry2::new(CAMERA, 0.0))
+            }
+        };
+        let frames = [format!("{robot}/base_link"), format!("{robot}/{name}")];
+        log.message(0.0, "/tf_static", &transform(0.0, frames, pose.into()));
+    }
+
+    /// Writes a measurement of a tag that is at `seen` in the frame of the robot.
+    fn write_measurement(
+        &self,
+        log: &mut LogBuilder,
+        seconds: f64,
+        number: usize,
+        seen: Point2<f64>,
+        random: &mut ChaCha8Rng,
+    ) {
+        let (robot, distance) = (self.robot, seen.coords.norm());
+        match self.sense {
+            Sense::Ranges { stddev, outliers } => {
+                let longer = if random.random::<f64>() < outliers { 5.0 * random.random::<f64>() } else { 0.0 };
+                let range = (distance + stddev * noise(random) + longer).max(0.01);
+                log.reading(seconds, robot, &format!("beacon{number}"), range);
+            }
+            Sense::Bearings { stddev, outliers } => {
+                let from_antennas = antennas().inverse() * seen;
+                let any = random.random::<f64>() < outliers;
+                let turn = if any { TAU * random.random::<f64>() } else { stddev * noise(random) };
+                let bearing = from_antennas.y.atan2(from_antennas.x) + turn;
+                let header = header(seconds, format!("{robot}/antennas"));
+                let none = Vec::<f64>::new();
+                let name = vec![format!("tag{number}")];
+                let bytes = encode(&(header, name, vec![-bearing.to_degrees()], none.clone(), none)).unwrap();
+                log.raw(seconds, &format!("/{robot}/directions"), "sensor_msgs/msg/JointState", &bytes);
+            }
+            Sense::Camera { stddev } => {
+                let error = Vector2::new(noise(random), noise(random));
+                let seen = seen.coords + error * stddev * distance - CAMERA;
+                let translation = Vector3 { x: seen.x, y: seen.y, z: 0.2 };
+                let frames = [format!("{robot}/camera"), format!("tag36h11:{number}")];
+                let at = Transform { translation, ..Default::default() };
+                log.message(seconds, "/tf", &transform(seconds, frames, at));
+            }
+        }
+    }
+}
+
+/// A sample of the standard normal distribution.
+fn noise(random: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(random)
 }

@@ -249,6 +249,70 @@ fn draw(from: &Path, to: &Path) -> Result<()> {
     std::fs::write(to, plot.to_svg()?).with_context(|| format!("cannot write {}", to.display()))
 }
 
+/// The bases, the one above the others first, and the ports to which robots send.
+fn start_bases(folder: &Path, floors: usize, to: u16) -> Result<(Vec<Base>, Vec<u16>)> {
+    if floors == 1 {
+        let port = port()?;
+        return Ok((vec![Base::start(folder, "base", port, to)?], vec![port]));
+    }
+    let above = port()?;
+    let (mut bases, mut ports) = (vec![Base::start(folder, "above", above, to)?], Vec::new());
+    for floor in 1..=floors {
+        let port = port()?;
+        bases.push(Base::start(folder, &format!("floor{floor}"), port, above)?);
+        ports.push(port);
+    }
+    Ok((bases, ports))
+}
+
+/// What comes from the bases, and what they need.
+#[derive(Default)]
+struct Came {
+    /// The number of merged maps.
+    merged: u64,
+    /// The known cells of the last one.
+    cells: usize,
+    /// From a robot's map to the merged map, seconds.
+    latencies: Vec<f64>,
+    /// The most memory, bytes, the most stages that work at a time, and the most dropped messages.
+    memory: f64,
+    busy: f64,
+    dropped: f64,
+}
+
+impl Came {
+    /// Adds a message of the topic of merged maps.
+    fn add(&mut self, message: &Message, sent: &Mutex<Sending>) {
+        if !message.header().flags.contains(MessageFlags::DATA) {
+            return;
+        }
+        self.merged += 1;
+        if let Ok(grid) = message.decode::<OccupancyGrid<'_>>() {
+            self.cells = grid.data.iter().filter(|cell| **cell <= 100).count();
+        }
+        let sent = sent.lock().unwrap_or_else(PoisonError::into_inner).maps.get(&message.header().log_time.0).copied();
+        self.latencies.extend(sent.map(|sent| sent.elapsed().as_secs_f64()));
+    }
+
+    /// Looks at what the bases need now.
+    fn look(&mut self, bases: &[Base]) -> Result<()> {
+        let seen: Vec<_> = bases.iter().map(Base::look).collect::<Result<_>>()?;
+        let sum = |of: fn(&(f64, f64, f64)) -> f64| seen.iter().map(of).sum::<f64>();
+        self.memory = self.memory.max(sum(|seen| seen.0));
+        self.busy = self.busy.max(sum(|seen| seen.1));
+        self.dropped = self.dropped.max(sum(|seen| seen.2));
+        Ok(())
+    }
+
+    /// The latency of this share of the maps, seconds.
+    fn latency(&self, share: f64) -> String {
+        let mut latencies = self.latencies.clone();
+        latencies.sort_by(f64::total_cmp);
+        let at = ((latencies.len() as f64 - 1.0) * share).round().max(0.0) as usize;
+        latencies.get(at).map_or_else(String::new, |latency| format!("{latency:.2}"))
+    }
+}
+
 /// One row of the table.
 fn measure(robots: usize, floors: usize) -> Result<String> {
     let registry = gridweave::shipped::registry(gridweave_ros::kinds());
@@ -265,19 +329,7 @@ fn measure(robots: usize, floors: usize) -> Result<String> {
         &gridweave_bridge::source::kind(),
         &format!("listen = [\"tcp/127.0.0.1:{last}\"]\nclock_tolerance = 1e9"),
     )?;
-    let mut bases = Vec::new();
-    let mut ports = Vec::new();
-    if floors == 1 {
-        ports.push(port()?);
-        bases.push(Base::start(folder.path(), "base", ports[0], last)?);
-    } else {
-        let above = port()?;
-        bases.push(Base::start(folder.path(), "above", above, last)?);
-        for floor in 1..=floors {
-            ports.push(port()?);
-            bases.push(Base::start(folder.path(), &format!("floor{floor}"), ports[floor - 1], above)?);
-        }
-    }
+    let (bases, ports) = start_bases(folder.path(), floors, last)?;
     thread::sleep(Duration::from_secs(3));
     let all = Arc::new(Mutex::new(Sending::default()));
     let start = Instant::now() + Duration::from_secs(2);
@@ -289,32 +341,18 @@ fn measure(robots: usize, floors: usize) -> Result<String> {
             thread::spawn(move || drive(&robot, to, start, &all))
         })
         .collect();
-    let (mut latencies, mut merged, mut cells) = (Vec::new(), 0, 0);
-    let (mut memory, mut busy, mut dropped) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let mut came = Came::default();
     let mut next_look = start + Duration::from_secs(u64::from(DURATION) / 2);
     let end = start + Duration::from_secs(DURATION.into()) + AFTERWARDS;
     while Instant::now() < end {
         collector.node().wait(Duration::from_millis(20));
         collector.node().advance()?;
         for message in collector.take_messages("map") {
-            if !message.header().flags.contains(MessageFlags::DATA) {
-                continue;
-            }
-            merged += 1;
-            if let Ok(grid) = message.decode::<OccupancyGrid<'_>>() {
-                cells = grid.data.iter().filter(|cell| **cell <= 100).count();
-            }
-            let sent =
-                all.lock().unwrap_or_else(PoisonError::into_inner).maps.get(&message.header().log_time.0).copied();
-            latencies.extend(sent.map(|sent| sent.elapsed().as_secs_f64()));
+            came.add(&message, &all);
         }
         if Instant::now() >= next_look {
             next_look += Duration::from_secs(15);
-            let seen: Vec<_> = bases.iter().map(Base::look).collect::<Result<_>>()?;
-            let sum = |of: fn(&(f64, f64, f64)) -> f64| seen.iter().map(of).sum::<f64>();
-            memory = memory.max(sum(|seen| seen.0));
-            busy = busy.max(sum(|seen| seen.1));
-            dropped = dropped.max(sum(|seen| seen.2));
+            came.look(&bases)?;
         }
     }
     for thread in threads {
@@ -327,24 +365,23 @@ fn measure(robots: usize, floors: usize) -> Result<String> {
     drop(bases);
     let said = std::fs::read_to_string(last).unwrap_or_default();
     writeln!(std::io::stderr(), "{said}")?;
-    latencies.sort_by(f64::total_cmp);
-    let quantile = |share: f64| {
-        let at = ((latencies.len() as f64 - 1.0) * share).round().max(0.0) as usize;
-        latencies.get(at).map_or_else(|| "".to_owned(), |latency| format!("{latency:.2}"))
-    };
     let all = all.lock().unwrap_or_else(PoisonError::into_inner);
     let count = |what: &str| all.counts.get(what).copied().unwrap_or_default() as f64;
     let sent = count("bytes sent");
     Ok(format!(
-        "{robots},{},{:.2},{:.2},{:.1},{},{merged},{},{},{cells},{:.0},{busy:.2},{},{dropped}",
+        "{robots},{},{:.2},{:.2},{:.1},{},{},{},{},{},{:.0},{:.2},{},{}",
         if floors == 1 { 1 } else { floors + 1 },
         sent * 1e-6,
         count("bytes of the messages in them") * 1e-6,
         sent * 8e-3 / f64::from(DURATION) / robots as f64,
         all.maps.len(),
-        quantile(0.5),
-        quantile(0.95),
-        memory * 1e-6,
+        came.merged,
+        came.latency(0.5),
+        came.latency(0.95),
+        came.cells,
+        came.memory * 1e-6,
+        came.busy,
         count("messages dropped because the bridge does not keep up"),
+        came.dropped,
     ))
 }
