@@ -180,22 +180,8 @@ impl ElasticRefiner {
                 (frame.robot.clone(), known.cloned().unwrap_or_else(shape))
             };
             self.shapes = placed.iter().map(shape).collect();
-            let bodies: Vec<Body<'_>> = placed
-                .iter()
-                .zip(known)
-                .map(|((frame, map), known)| {
-                    let shape = Arc::clone(&self.shapes[&frame.robot].1);
-                    let body = Body::of(shape, map.walls(NORMAL_RADIUS), frame.transform_reference_robot());
-                    if self.parameters.keep_reference && frame.robot == self.frames.reference {
-                        return body.kept();
-                    }
-                    match known {
-                        Some(known) if are_held => body.held(known),
-                        Some(known) => body.deformed(known),
-                        None => body,
-                    }
-                })
-                .collect();
+            let kept = self.parameters.keep_reference.then_some(&*self.frames.reference);
+            let bodies = bodies(&placed, known, &self.shapes, are_held, kept);
             match refine(&bodies, &deformation) {
                 Some(refinement) => {
                     started_from_known = refinement.started_from_known;
@@ -227,6 +213,28 @@ impl ElasticRefiner {
         self.deformed_maps = deformed_maps;
         output.frames.send("", &self.frames)
     }
+}
+
+/// The bodies of the placed maps, deformed as it is known of them. Known deformations stay if they `are_held`; the map of
+/// the robot `kept` is not deformed.
+fn bodies<'a>(
+    placed: &[(&RobotFrame, &'a RobotMap<WallsOnDemand>)],
+    known: Vec<Option<Deformation>>,
+    shapes: &BTreeMap<String, (u64, Arc<Shape>)>,
+    are_held: bool,
+    kept: Option<&str>,
+) -> Vec<Body<'a>> {
+    let body = |((frame, map), known): (&(&RobotFrame, &'a RobotMap<WallsOnDemand>), Option<Deformation>)| {
+        let shape = Arc::clone(&shapes[&frame.robot].1);
+        let body = Body::of(shape, map.walls(NORMAL_RADIUS), frame.transform_reference_robot());
+        match known {
+            _ if kept == Some(&*frame.robot) => body.kept(),
+            Some(known) if are_held => body.held(known),
+            Some(known) => body.deformed(known),
+            None => body,
+        }
+    };
+    placed.iter().zip(known).map(body).collect()
 }
 
 fn message(
