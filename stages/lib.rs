@@ -1,11 +1,11 @@
-//! The stages of Gridweave, in rooms that follow the way of a map through a pipeline:
+//! The stages of Gridweave, one module for each step of a merge:
 //!
 //! 1. [`mapping`]: the map of one robot, from its scans or as it published it;
 //! 2. [`tags`] and [`topology`]: hypotheses of the relative pose of two maps, from tags and from topological maps;
 //! 3. [`registration`]: hypotheses from the maps alone, their refinement, and the judgement of all;
 //! 4. [`merge`]: one pose for each robot, and one map.
 //!
-//! [`simulator`] and [`python_stage`] are stages of their own, and [`shared`] is what the rooms have in common. A stage
+//! [`simulator`] and [`python_stage`] are stages of their own, and [`shared`] is what the modules have in common. A stage
 //! is a folder: the algorithm as plain functions on slices and nalgebra types, and beside it `stage.rs`, the thin
 //! adapter that turns messages into calls.
 

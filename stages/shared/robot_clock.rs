@@ -47,7 +47,7 @@ impl Reading {
     /// Whether `time` follows this message without a leap.
     fn is_followed_by(&self, time: LogTime, log_time: LogTime) -> bool {
         let passed = log_time.seconds_since(self.log_time);
-        // Messages that were held back come together, and the log times tell nothing of the time between them.
+        // Messages that were held back come together, and the log times do not show the time between them.
         let longest = if passed > 0.0 { LONGEST_DISORDER + FASTEST_CLOCK * passed } else { LONGEST_DELAY };
         (-LONGEST_DISORDER..=longest).contains(&time.seconds_since(self.time))
     }
@@ -91,7 +91,7 @@ impl RobotClock {
         let shifts = std::iter::once(0).chain(known.iter().map(|last| last.shift)).chain(others());
         let fits = |shift: &i128| match (&known, &self.latest) {
             (Some(last), _) => last.is_followed_by(shifted(*shift), log_time),
-            // Of the first message of a kind, only another clock can be told.
+            // By the first message of a kind, only another clock can be detected.
             (None, Some(latest)) => {
                 let most = if latest.is_stamped { LONGEST_DELAY } else { LONGEST_DISORDER };
                 shifted(*shift).seconds_since(latest.expected(log_time)).abs() <= most

@@ -32,9 +32,9 @@ fn a_port_that_the_system_chooses_is_reported() {
     run.top();
     let done = run.interrupt();
     done.assert_done();
-    let told = done.ended.text();
-    let port: String = told.split_once("ws://127.0.0.1:").unwrap().1.chars().take_while(char::is_ascii_digit).collect();
-    assert_ne!(port.parse::<u16>().unwrap(), 0, "{told}");
+    let text = done.ended.text();
+    let port: String = text.split_once("ws://127.0.0.1:").unwrap().1.chars().take_while(char::is_ascii_digit).collect();
+    assert_ne!(port.parse::<u16>().unwrap(), 0, "{text}");
 }
 
 #[test]
@@ -54,8 +54,8 @@ fn a_viewer_of_the_older_protocol_is_refused_and_the_needed_one_is_named() {
         assert!(answer.starts_with("HTTP/1.1 400"), "{answer}");
     }
     let done = run.interrupt();
-    let told = done.ended.text();
-    assert_eq!(told.matches("`foxglove.sdk.v1`").count(), 1, "{told}");
+    let text = done.ended.text();
+    assert_eq!(text.matches("`foxglove.sdk.v1`").count(), 1, "{text}");
 }
 
 #[test]

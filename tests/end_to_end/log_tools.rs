@@ -1,4 +1,4 @@
-//! What there is for logs beside merging them: they are recovered, filtered, printed, and laid together.
+//! The commands for logs beside `merge`: they recover, filter and print logs, and put several into one.
 
 use crate::support::{LogBuilder, SMALL_BUILDING, gridweave, simulate};
 use gridweave_runtime::ros::{OccupancyGrid, PoseStamped, TagRange};

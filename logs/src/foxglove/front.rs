@@ -164,7 +164,7 @@ mod tests {
         let _ = client.read_to_end(&mut all);
         let mut rest = Vec::new();
         server.read_to_end(&mut rest).unwrap();
-        assert!(rest.ends_with(b"\r\n\r\n"), "the server is told");
+        assert!(rest.ends_with(b"\r\n\r\n"), "the server receives the end");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Messages of several robots on one topic, which their frames alone tell apart.
+//! Messages of several robots on one topic, which only their frames distinguish.
 
 use super::merged_maps::own;
 use super::part_names::is_part;

@@ -132,7 +132,7 @@ impl ChannelRouter {
         {
             // A map of two robots is worse than none. Live, the others go on.
             if self.holds_undecided {
-                return Err(StageError::new("tell robots apart", mixed));
+                return Err(StageError::new("distinguish the robots", mixed));
             }
             output.warn(mixed);
             return Ok(());

@@ -162,7 +162,7 @@ fn a_receiver_that_begins_anew_gets_what_waits_and_the_last_of_each_topic() {
 }
 
 #[test]
-fn what_an_end_tells_of_itself_does_not_pile_up_and_is_not_counted() {
+fn the_reports_of_an_end_do_not_pile_up_and_are_not_counted() {
     let (mut outbox, mut ingest) = (outbox(7, 3), Ingest::new(1, SECOND));
     outbox.report_on(MAPS);
     carry(&mut outbox, &mut ingest, 0);

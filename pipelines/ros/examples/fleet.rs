@@ -319,7 +319,7 @@ fn measure(robots: usize, floors: usize) -> Result<String> {
     // A map of a floor is merged with another only where both show enough of the same.
     let overlap = if floors == 1 { 0.3 } else { 0.65 };
     let mut fleet = simulate(robots, overlap, &registry)?;
-    // Robots differ in when they send: with one time for all, maps could not be told apart.
+    // Robots differ in when they send: with one time for all, maps could not be distinguished.
     for (number, robot) in fleet.iter_mut().enumerate() {
         robot.messages.iter_mut().for_each(|(_, _, time, _)| *time += number as u64);
     }

@@ -86,7 +86,7 @@ impl Graph {
         self.settle();
     }
 
-    /// Tells of endpoints whose node is known, or was waited for long enough.
+    /// Reports endpoints whose node is known, or was waited for long enough.
     fn settle(&self) {
         let now = Instant::now();
         let mut seen = lock(&self.seen);
@@ -219,7 +219,7 @@ fn problem(mismatch: &Mismatch, name: Option<&NodeName>) -> String {
     )
 }
 
-/// The first digits of a type's hash, which are enough to tell two definitions apart: `RIHS01_df668c74`.
+/// The first digits of a type's hash, which are enough to distinguish two definitions: `RIHS01_df668c74`.
 pub(crate) fn short_hash(hash: &str) -> &str {
     let end = hash.find('_').map_or(0, |at| at + 1) + HASH_DIGITS;
     hash.get(..end).unwrap_or(hash)

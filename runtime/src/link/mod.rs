@@ -6,7 +6,7 @@
 //!   decreases.
 //! - **No loss.** A reader grants credit, and a sender without credit waits (backpressure). A live link can be
 //!   configured to drop the oldest message instead; every drop is counted.
-//! - **Progress.** In a replay a *watermark* tells a reader that no message before a log time will follow, so that a
+//! - **Progress.** In a replay a *watermark* guarantees a reader that no message before a log time will follow, so that a
 //!   stage with several inputs can continue while one of them is silent. The end of a stream is a message too, so a
 //!   sender that died is never mistaken for one that has finished.
 //!

@@ -1,4 +1,4 @@
-//! The process of a program, and the bells between it and its stage.
+//! The process of a program, and the events by which it and its stage wake each other.
 
 use crate::engine::describe_exit;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -54,7 +54,7 @@ pub(super) struct Process {
     child: Child,
     input: Option<ChildStdin>,
     output: ChildStdout,
-    /// Bells that were heard, and for which nothing was taken yet.
+    /// Events that were received and not handled yet.
     received: Vec<u8>,
 }
 

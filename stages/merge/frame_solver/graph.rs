@@ -167,8 +167,8 @@ impl Forest {
         let mut on_path = Vec::new();
         while sides[0].0 != sides[1].0 {
             // The deeper side goes up first, so that both meet at their nearest common ancestor.
-            let climbs = usize::from(self.depth[sides[1].0] > self.depth[sides[0].0]);
-            let (robot, transform_end_robot) = &mut sides[climbs];
+            let deeper = usize::from(self.depth[sides[1].0] > self.depth[sides[0].0]);
+            let (robot, transform_end_robot) = &mut sides[deeper];
             let (through, parent) = self.parent[*robot]?;
             *transform_end_robot = transform_end_robot.then(&edges[through].transform_from(*robot));
             *robot = parent;

@@ -194,7 +194,7 @@ fn a_merged_map_is_left_out_whatever_its_frame_is_and_taken_in_by_the_option() {
 }
 
 #[test]
-fn a_robot_whose_map_is_in_the_world_is_told_from_a_program_by_what_else_it_has() {
+fn a_robot_whose_map_is_in_the_world_is_distinguished_from_a_program_by_what_else_it_has() {
     let log = |log: &mut TestLog| {
         merged_beside_two(log, "/drone/map", "world");
         log.raw("/drone/imu", "sensor_msgs/msg/Imu", 1, b"");

@@ -34,7 +34,7 @@ fn network_namespaces_of_robots_and_a_merge_find_each_other_by_multicast() {
     let seen: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(folder.join("seen.json")).unwrap()).unwrap();
     assert_eq!((&seen["map"]["frame"], &seen["publisher"][0]), (&"world".into(), &"gridweave_ros".into()), "{seen}");
-    let told = std::fs::read_to_string(folder.join("merging.txt")).unwrap();
-    assert!(!told.contains("warning"), "{told}");
+    let text = std::fs::read_to_string(folder.join("merging.txt")).unwrap();
+    assert!(!text.contains("warning"), "{text}");
     run(GRIDWEAVE, &["evaluate", "summary.json", "--truth", "in.truth.json"], folder);
 }

@@ -148,6 +148,6 @@ fn arguments_of_ros_are_refused_with_what_to_write_instead() {
     let mut running =
         Running::start(GRIDWEAVE, &["run", "a.toml", "--ros-args", "-r", "/map:=/b"], folder.path(), "log");
     running.end_with(2);
-    let told = running.errors();
-    assert!(told.contains("--set ros.rename='[\"/map=/b\"]'") && told.lines().count() <= 3, "{told}");
+    let errors = running.errors();
+    assert!(errors.contains("--set ros.rename='[\"/map=/b\"]'") && errors.lines().count() <= 3, "{errors}");
 }

@@ -96,8 +96,8 @@ fn domains_hear_nothing_of_each_other() {
     let mut stranger = other.sink("slam", MAP);
     give(&mut stranger, 0, "/robot1/map", map(20, 1));
     // What other sources hear of the stranger has come, and this one has heard nothing.
-    let mut hearer = other.source("");
-    sent(&mut hearer, "map", 1);
+    let mut subscriber = other.source("");
+    sent(&mut subscriber, "map", 1);
     let mut robot = domain.sink("slam", MAP);
     give(&mut robot, 0, "/robot1/map", map(20, 2));
     assert_eq!(value_of(&sent(&mut source, "map", 1)[0], 20), 2);

@@ -72,7 +72,7 @@ fn a_link_that_is_not_sent_is_shown_at_the_base_as_on_its_machine() {
     let decoded = ["\"type\":\"geometry_msgs/msg/PoseWithCovarianceStamped\"", "\"position\":{"];
     assert!(decoded.iter().all(|words| there_lines[5].contains(words)), "{}", there_lines[5]);
     // Names that are none.
-    for (link, told) in [
+    for (link, expected) in [
         ("robot-7:robots.pose", "has no machine `robot-7`; did you mean `robot-1`?"),
         ("other:robots.pose", "has no machine `other`; there are: `robot-1`"),
         ("robot-1:robots.poses", "the run on `robot-1` has no link `robots.poses`; did you mean `robots.pose`?"),
@@ -82,7 +82,7 @@ fn a_link_that_is_not_sent_is_shown_at_the_base_as_on_its_machine() {
         let args = ["tap", link, "--run", &base_name, "--wait", "1"];
         let mut wrong = Running::start(GRIDWEAVE, &args, robot.path(), "wrong.log");
         wrong.end_with(2);
-        assert!(wrong.errors().contains(told), "{link}: {}", wrong.errors());
+        assert!(wrong.errors().contains(expected), "{link}: {}", wrong.errors());
     }
     // From elsewhere, where no run is known.
     run(GRIDWEAVE, &["tap", "robot-1:robots.pose", "--at", &endpoint, "--count", "1"], robot.path());
@@ -95,8 +95,8 @@ fn a_link_that_is_not_sent_is_shown_at_the_base_as_on_its_machine() {
         let mut tap = Running::start(GRIDWEAVE, &args, robot.path(), "more.log");
         (tap.end().0, tap.errors())
     };
-    let (status, told) = one_more();
-    assert!(status == 1 && told.contains("observe"), "{status} {told}");
+    let (status, errors) = one_more();
+    assert!(status == 1 && errors.contains("observe"), "{status} {errors}");
     taps[0].signal("KILL");
     wait_until("room", || one_more().0 == 0, || base.errors());
     // An interrupt ends a tap, and the end of the run all others. Nothing keeps the run from it.
@@ -222,8 +222,8 @@ fn a_tap_whose_wire_is_cut_is_closed_at_the_robot_and_goes_on_when_it_is_restore
     assert_eq!(came, [1, 2, 3]);
     let warnings = tap.warnings();
     assert_eq!(warnings["`slam.pose` was reopened: messages may have been missed"], 2, "{warnings:?}");
-    let is_told = |tap: &mut StageHarness| tap.counts().get("messages missed") == Some(&(3 * MISSED));
-    assert_eq!(go_on(&mut tap, "missed", is_told), None);
+    let has_missed = |tap: &mut StageHarness| tap.counts().get("messages missed") == Some(&(3 * MISSED));
+    assert_eq!(go_on(&mut tap, "missed", has_missed), None);
     // The end of the tap.
     assert_eq!(go_on(&mut tap, "open", |_| viewers() == 1), None);
     drop(tap);
@@ -233,11 +233,11 @@ fn a_tap_whose_wire_is_cut_is_closed_at_the_robot_and_goes_on_when_it_is_restore
 #[test]
 fn a_machine_that_is_not_there_is_waited_for_and_the_end_of_its_run_is_that_of_the_tap() {
     let (endpoint, port) = free_endpoint();
-    let told =
+    let has_warned =
         |words: &'static str| move |tap: &mut StageHarness| tap.warnings().keys().any(|text| text.contains(words));
     // Nobody is there yet.
     let mut tap = tap_stage(&endpoint, "");
-    assert_eq!(go_on(&mut tap, "base", told("cannot connect to any machine")), None);
+    assert_eq!(go_on(&mut tap, "base", has_warned("cannot connect to any machine")), None);
     let _base = source(&endpoint, "");
     let (wire, by_wire) = Wire::new(port);
     let link = Link::default();
@@ -252,7 +252,7 @@ fn a_machine_that_is_not_there_is_waited_for_and_the_end_of_its_run_is_that_of_t
     assert_eq!(go_on(&mut tap, "first", |tap| all_came(tap, 1)), None);
     // The robot drives out of reach, and comes back.
     wire.cut();
-    assert_eq!(go_on(&mut tap, "gone", told("the machine `robot-1` is gone: it is waited for")), None);
+    assert_eq!(go_on(&mut tap, "gone", has_warned("the machine `robot-1` is gone: it is waited for")), None);
     wire.restore();
     pass(2);
     assert_eq!(go_on(&mut tap, "second", |tap| all_came(tap, 2)), None);
@@ -270,14 +270,14 @@ fn a_machine_that_is_not_there_is_waited_for_and_the_end_of_its_run_is_that_of_t
 
 #[test]
 fn a_robot_that_does_not_show_its_links_says_why() {
-    for (more, link, told) in [
+    for (more, link, expected) in [
         ("allow_tap = false", Some(Link::default()), "`allow_tap = false`"),
         ("", None, "the links of its run cannot be observed"),
     ] {
         let (endpoint, _) = free_endpoint();
         let _base = source(&endpoint, "");
         let _robot = robot(&endpoint, more, link.as_ref());
-        let error = go_on(&mut tap_stage(&endpoint, ""), told, |_| false).unwrap();
-        assert!(error.starts_with("cannot observe `slam` of `robot-1`: ") && error.contains(told), "{error}");
+        let error = go_on(&mut tap_stage(&endpoint, ""), expected, |_| false).unwrap();
+        assert!(error.starts_with("cannot observe `slam` of `robot-1`: ") && error.contains(expected), "{error}");
     }
 }

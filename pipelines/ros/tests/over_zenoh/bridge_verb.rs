@@ -271,18 +271,18 @@ fn a_restart_of_a_killed_base_is_reported_and_it_gets_later_messages() {
         came += second.len() as u64;
         superseded += u64::from(is_map);
     }
-    let told = bridge.errors();
+    let errors = bridge.errors();
     let lost = sent - before - came;
-    assert!(lost >= superseded, "{lost} {told}");
-    assert!(carried.contains(&format!("carried {} of {sent} messages", sent - lost)), "{carried}{told}");
-    assert_eq!(status, 1, "{told}");
+    assert!(lost >= superseded, "{lost} {errors}");
+    assert!(carried.contains(&format!("carried {} of {sent} messages", sent - lost)), "{carried}{errors}");
+    assert_eq!(status, 1, "{errors}");
     assert!(
-        told.contains("warning: the receiver `base` is gone: what follows waits until it is there again (1 times)"),
-        "{told}"
+        errors.contains("warning: the receiver `base` is gone: what follows waits until it is there again (1 times)"),
+        "{errors}"
     );
     assert!(
-        told.contains("warning: only the last of the pending maps were sent, as the receiver was restarted"),
-        "{told}"
+        errors.contains("warning: only the last of the pending maps were sent, as the receiver was restarted"),
+        "{errors}"
     );
     // What the killed run has left.
     run(GRIDWEAVE, &["clean"], robot.path());
@@ -301,29 +301,29 @@ fn top_at_the_base_shows_the_stages_of_the_robot_with_its_name() {
         let args = ["top", "--once", "--interval", "0.3", "--run", &name, "--wait", "60"];
         run(GRIDWEAVE, &[&args, more].concat(), robot.path())
     };
-    let mut told = serde_json::Value::Null;
-    let is_told = || {
+    let mut machine = serde_json::Value::Null;
+    let is_shown = || {
         let shown: serde_json::Value = serde_json::from_str(&top(&["--json"])).unwrap();
-        told = shown["machines"][0].clone();
-        told["stages"][1]["messages_in"] == sent
+        machine = shown["machines"][0].clone();
+        machine["stages"][1]["messages_in"] == sent
     };
-    wait_until("the robot's stages", is_told, || bridge.errors() + &base.errors());
-    let names = told["stages"].as_array().unwrap().iter().map(|stage| stage["name"].as_str().unwrap());
+    wait_until("the robot's stages", is_shown, || bridge.errors() + &base.errors());
+    let names = machine["stages"].as_array().unwrap().iter().map(|stage| stage["name"].as_str().unwrap());
     assert_eq!(
-        (told["machine"].as_str(), names.collect::<Vec<_>>()),
+        (machine["machine"].as_str(), names.collect::<Vec<_>>()),
         (Some("robot"), vec!["robots", "output"]),
-        "{told}"
+        "{machine}"
     );
-    assert_eq!(told["stages"][0]["state"], "running", "{told}");
+    assert_eq!(machine["stages"][0]["state"], "running", "{machine}");
     let shown = top(&[]);
     let words = |line: &str| line.split_whitespace().take(2).map(str::to_owned).collect::<Vec<_>>().join(" ");
     let rows: Vec<String> = shown.lines().skip(1).map(words).collect();
     assert_eq!(rows, ["MACHINE STAGE", "(here) robots", "(here) output", "robot robots", "robot output"], "{shown}");
-    // A run that is told of no others looks as ever.
+    // A run without reports of other machines looks as ever.
     let alone = run(GRIDWEAVE, &["top", "--once", "--interval", "0.1", "--run", &robot.name], robot.path());
     assert!(!alone.contains("MACHINE"), "{alone}");
     robot.end();
-    // What a bridge has to tell of itself is not counted with what it carries.
+    // The reports of the bridge itself are not counted with the messages that it carries.
     let carried = bridge.end_with(0);
     assert!(carried.contains(&format!("carried {sent} of {sent} messages of 3 links")), "{carried}");
     base.end_with(0);
@@ -340,7 +340,7 @@ fn without_a_base_a_bridge_says_so_and_ends_with_status_1() {
     bridge.signal("INT");
     let carried = bridge.end_with(1);
     assert!(carried.contains("carried 0 of "), "{carried}");
-    let told = bridge.errors();
-    assert!(told.contains("the other end of the bridge has not acknowledged the end within 0.1 s"), "{told}");
+    let errors = bridge.errors();
+    assert!(errors.contains("the other end of the bridge has not acknowledged the end within 0.1 s"), "{errors}");
     robot.end();
 }

@@ -97,7 +97,7 @@ fn network_namespaces_that_are_cut_off_for_a_while_end_in_the_same_map_as_a_wire
     let folder = tempfile::tempdir().unwrap();
     // Longer than Zenoh takes to hold the other end for gone.
     carry(folder.path(), &["--rate", "1e6", "--delay", "0.05", "--loss", "0.0", "--cut", "60:15"]);
-    let told = fs::read_to_string(folder.path().join("base.txt")).unwrap();
-    assert!(told.contains("is gone"), "{told}");
+    let text = fs::read_to_string(folder.path().join("base.txt")).unwrap();
+    assert!(text.contains("is gone"), "{text}");
     assert_same_merged_map(folder.path());
 }

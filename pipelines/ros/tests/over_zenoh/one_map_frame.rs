@@ -1,4 +1,4 @@
-//! Robots whose maps are all in one frame, `map`, as where the SLAM of each is told no frame of its own.
+//! Robots whose maps are all in one frame, `map`, as where no SLAM has a frame of its own.
 
 use crate::stages::{map, source_with, wait_until_heard};
 use crate::waiting::sent;

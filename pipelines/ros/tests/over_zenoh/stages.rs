@@ -232,7 +232,7 @@ fn frames_are_published_together_and_do_not_jump() {
     let mut sink = sink(&router.parameters(), &[(RobotFrames::NAME, "/robot_frames"), (TFMessage::NAME, "/tf_static")]);
     let viewer = Robot::start(&router, "viewer");
     let heard = viewer.subscribe(&topic("/tf_static", TFMessage::NAME), Qos::latched(1));
-    let mut tell = |robot: &str, x| {
+    let mut give_frame = |robot: &str, x| {
         let frame_id = format!("{robot}/map");
         let covariance = [0.01, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0001];
         let frame = RobotFrame { robot: robot.into(), frame_id: frame_id.clone(), x, covariance, ..Default::default() };
@@ -246,12 +246,12 @@ fn frames_are_published_together_and_do_not_jump() {
         message.transforms.into_iter().map(|edge| (edge.child_frame_id, edge.transform.translation.x)).collect()
     };
     let at = |one: f64, two: f64| vec![("robot1/map".to_owned(), one), ("robot2/map".to_owned(), two)];
-    tell("robot1", 0.0);
+    give_frame("robot1", 0.0);
     assert_eq!(places(heard.next()), at(0.0, 5.0)[..1]);
-    tell("robot2", 5.0);
+    give_frame("robot2", 5.0);
     assert_eq!(places(heard.next()), at(0.0, 5.0));
-    tell("robot2", 5.1);
-    tell("robot2", 6.0);
+    give_frame("robot2", 5.1);
+    give_frame("robot2", 6.0);
     assert_eq!(places(heard.next()), at(0.0, 6.0), "5.1 is within what it is uncertain");
     assert_eq!(places(viewer.subscribe(&topic("/tf_static", TFMessage::NAME), Qos::latched(1)).next()), at(0.0, 6.0));
     assert_eq!(sink.counts()["frames moved"], 1);

@@ -176,14 +176,14 @@ fn a_peer_without_the_right_certificate_is_refused_and_both_ends_report_why() {
     let mut sinks: Vec<StageHarness> =
         refused.iter().map(|(endpoint, files, ..)| sink(endpoint, &format!("linger = 0.0\n{files}"))).collect();
     for (sink, (endpoint, _, words, _)) in sinks.iter_mut().zip(&refused) {
-        let mut told = String::new();
+        let mut warnings = String::new();
         let is_told = || {
             give_pose(sink, 1);
-            told = format!("{:?}", sink.warnings().keys());
-            told.contains("no receiver of the bridge") && words.iter().any(|words| told.contains(words))
+            warnings = format!("{:?}", sink.warnings().keys());
+            warnings.contains("no receiver of the bridge") && words.iter().any(|words| warnings.contains(words))
         };
         wait_until(words[0], is_told, || base.errors());
-        assert!(told.contains(*endpoint), "{told}");
+        assert!(warnings.contains(*endpoint), "{warnings}");
         let at_base = format!("a connection to tls/127.0.0.1:{port} was refused: ");
         base.wait_for(&at_base);
     }

@@ -19,7 +19,7 @@
 //!   whose rotations come out to 0.5 degrees and better.
 //! - **Similarity index**: the acceptance index of Birk and Carpin, the share of the cells known to both maps on which
 //!   they agree. It needs a translation: for each of the four rotations the maps' projections on the axes of the walls
-//!   are correlated, the best shifts of both axes are laid together in all ways, and the index is taken where it is
+//!   are correlated, all combinations of the best shifts of both axes are tried, and the index is taken where it is
 //!   greatest. A place at which the maps share little does not count, as the index is a share of whatever they have in
 //!   common.
 //!

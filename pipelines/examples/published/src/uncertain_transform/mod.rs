@@ -17,7 +17,7 @@
 //! - **Kernels per tile**: all cells of a tile of [`TILE`] x [`TILE`] take the kernel of its middle. S_n changes from
 //!   one edge of a tile to the other by the turn of as many cells, which is far below the width of a kernel.
 //! - **Wide kernels on coarse cells**: where a place is uncertain by four cells and more in every direction, the kernel
-//!   is laid on means of 2 x 2 cells, and narrowed by what these means blur. Nothing so blurred has any detail of the
+//!   is applied to means of 2 x 2 cells, and narrowed by what these means blur. Nothing so blurred has any detail of the
 //!   size of a cell.
 //! - **A cell's own width**: the variance of a place in a square cell is added to S_n. It makes every S_n invertible,
 //!   that of the reference robot among them, whose map is not blurred by it.
