@@ -1,4 +1,4 @@
-//! Drift of a SLAM system's poses.
+//! PoseDrift of a SLAM system's poses.
 //!
 //! Heading and distance have random walks over the driven distance, and the accumulated error decays over a length,
 //! as loop closures correct drift. The error of every coordinate is thus a mean-reverting random walk (an
@@ -10,7 +10,7 @@ use rand_distr::StandardNormal;
 
 /// Parameters of the drift.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Drift {
+pub(super) struct PoseDrift {
     /// Standard deviation after one metre of driving: of the heading in radians, and of the distance in metres. It
     /// grows with the root of the way. A turn of one radian counts as a tenth of a metre.
     pub(super) deviation: f64,
@@ -19,7 +19,7 @@ pub(super) struct Drift {
 }
 
 /// Estimated poses for the true poses `truth`. The first is exact.
-pub(super) fn estimate_poses(truth: &[Pose2], drift: &Drift, random: &mut impl Rng) -> Vec<Pose2> {
+pub(super) fn estimate_poses(truth: &[Pose2], drift: &PoseDrift, random: &mut impl Rng) -> Vec<Pose2> {
     let Some(first) = truth.first() else { return Vec::new() };
     let mut estimates = Vec::with_capacity(truth.len());
     estimates.push(*first);
@@ -52,7 +52,7 @@ mod tests {
         (0..5000).map(|i| f64::from(i) * 0.01).map(|a| pose(5.0 * a.cos(), 5.0 * a.sin(), a + 1.57)).collect()
     }
 
-    fn worst(drift: Drift) -> f64 {
+    fn worst(drift: PoseDrift) -> f64 {
         let truth = circle();
         let estimates = estimate_poses(&truth, &drift, &mut ChaCha8Rng::seed_from_u64(3));
         assert_eq!(estimates.len(), truth.len());
@@ -62,20 +62,20 @@ mod tests {
 
     #[test]
     fn without_drift_poses_are_exact() {
-        assert!(worst(Drift { deviation: 0.0, correction_length: 0.0 }) < 1e-9);
+        assert!(worst(PoseDrift { deviation: 0.0, correction_length: 0.0 }) < 1e-9);
     }
 
     #[test]
     fn corrections_keep_an_error_small_that_would_grow() {
-        let corrected = worst(Drift { deviation: 0.01, correction_length: 10.0 });
-        let free = worst(Drift { deviation: 0.01, correction_length: 0.0 });
+        let corrected = worst(PoseDrift { deviation: 0.01, correction_length: 10.0 });
+        let free = worst(PoseDrift { deviation: 0.01, correction_length: 0.0 });
         assert!(corrected > 0.01 && corrected < 0.5, "{corrected}");
         assert!(free > 2.0 * corrected, "{free}");
     }
 
     #[test]
     fn no_poses_have_no_estimates() {
-        let drift = Drift { deviation: 0.01, correction_length: 10.0 };
+        let drift = PoseDrift { deviation: 0.01, correction_length: 10.0 };
         assert!(estimate_poses(&[], &drift, &mut ChaCha8Rng::seed_from_u64(3)).is_empty());
     }
 }

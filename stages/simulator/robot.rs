@@ -1,6 +1,6 @@
 //! One robot of a simulation: its drive, its estimates and its log.
 
-use super::drift::{Drift, estimate_poses};
+use super::drift::{PoseDrift, estimate_poses};
 use super::drive::{DriveLimits, drive};
 use super::lidar::Beam;
 use super::mapper::Mapper;
@@ -68,7 +68,7 @@ pub(super) fn simulate_robot(
     let transform_building_map = map_frame(start, world, robot, parameters);
     let transform_map_building = transform_building_map.inverse();
     let exact: Vec<Pose2> = true_poses.iter().map(|pose| transform_map_building * pose).collect();
-    let drift = Drift { deviation: parameters.drift, correction_length: parameters.correction_length };
+    let drift = PoseDrift { deviation: parameters.drift, correction_length: parameters.correction_length };
     let poses = estimate_poses(&exact, &drift, &mut world.random(Stream::Drift(robot)));
 
     let odometry = match parameters.odometry {

@@ -31,7 +31,7 @@ const REPORT_INTERVAL: Duration = Duration::from_secs(30);
 
 /// The settings of a sender.
 #[derive(Clone, Debug)]
-pub(super) struct Settings {
+pub(super) struct SenderSettings {
     pub(super) network: Network,
     /// Its name.
     pub(super) name: String,
@@ -72,7 +72,11 @@ impl Sender {
     ///
     /// # Errors
     /// The network cannot be joined.
-    pub(super) fn start(settings: Settings, mut links: Vec<Link>, report: Option<Report>) -> Result<Self, StageError> {
+    pub(super) fn start(
+        settings: SenderSettings,
+        mut links: Vec<Link>,
+        report: Option<Report>,
+    ) -> Result<Self, StageError> {
         let session = settings.network.open()?;
         let number = Presence::number_of(&session);
         let me = Presence { name: settings.name.clone(), number };
@@ -225,7 +229,7 @@ impl Search {
 /// The state of the thread.
 struct Worker {
     session: Session,
-    settings: Settings,
+    settings: SenderSettings,
     report: Option<Report>,
     shared: Arc<Shared>,
 }

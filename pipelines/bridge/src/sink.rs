@@ -5,7 +5,7 @@ use super::clock::Clock;
 use super::network::{BASE, Network, is_part_of_key};
 use super::outbox::{Limits, Totals};
 use super::report::Report;
-use super::sender::{Sender, Settings};
+use super::sender::{Sender, SenderSettings};
 use super::wire::Link;
 use gridweave_runtime::message::{Channel, FixedText, Message};
 use gridweave_runtime::ros::{OccupancyGrid, RosMessage, encode};
@@ -102,9 +102,9 @@ impl SinkParameters {
         Network { bridge, connect, listen, discover, zenoh_config, insecure, certificates }
     }
 
-    fn settings(&self, clock: Clock, context: &Context) -> Settings {
+    fn settings(&self, clock: Clock, context: &Context) -> SenderSettings {
         let seconds = |seconds: f64| Duration::try_from_secs_f64(seconds).unwrap_or_default();
-        Settings {
+        SenderSettings {
             network: self.network(),
             name: self.sender.clone().unwrap_or_else(machine),
             limits: Limits { messages: self.keep_last, states: self.keep_maps },

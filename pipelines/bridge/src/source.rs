@@ -148,7 +148,7 @@ impl Ports {
     }
 }
 
-enum Event {
+enum SourceEvent {
     Sender(Presence, bool),
     Batch(Query, i64),
 }
@@ -156,9 +156,9 @@ enum Event {
 /// The receiving end of a bridge.
 pub(super) struct BridgeSource {
     ingest: Ingest,
-    events: Receiver<Event>,
+    events: Receiver<SourceEvent>,
     /// The received events that were not handled yet.
-    waiting: VecDeque<Event>,
+    waiting: VecDeque<SourceEvent>,
     key: String,
     clock: Clock,
     /// The connected senders.
@@ -189,11 +189,11 @@ impl BridgeSource {
         let (to, events) = channel();
         let batches = to.clone();
         // A batch that arrives while the stage ends is not answered, and sent again to the next receiver.
-        let take = move |query: Query| drop(batches.send(Event::Batch(query, clock.nanoseconds())));
+        let take = move |query: Query| drop(batches.send(SourceEvent::Batch(query, clock.nanoseconds())));
         let queryable = session.declare_queryable(key.clone()).callback(take).wait();
         let queryable = queryable.map_err(|error| StageError::new("receive over the bridge", in_words(&error)))?;
         watch(&session, &network.bridge, Role::Sender, move |sender, is_present| {
-            drop(to.send(Event::Sender(sender, is_present)));
+            drop(to.send(SourceEvent::Sender(sender, is_present)));
         })?;
         let token = me.declare(&session, &network.bridge, Role::Receiver)?;
         let tolerance = (parameters.clock_tolerance * 1e9) as i64;
@@ -377,8 +377,8 @@ impl Source for BridgeSource {
         for _ in 0..BATCHES {
             let Some(event) = self.waiting.pop_front().or_else(|| self.events.try_recv().ok()) else { break };
             match event {
-                Event::Sender(sender, is_present) => self.note_sender(sender, is_present, output),
-                Event::Batch(query, came) => self.take_batch(&query, came, output)?,
+                SourceEvent::Sender(sender, is_present) => self.note_sender(sender, is_present, output),
+                SourceEvent::Batch(query, came) => self.take_batch(&query, came, output)?,
             }
         }
         Ok(self.end_after.is_none_or(|senders| self.ended.len() < senders))

@@ -1,7 +1,7 @@
 //! The solution as messages.
 
 use super::UncertainPose;
-use super::solution::{Alignments, Group, Solution};
+use super::solution::{Alignments, PlacedGroup, Solution};
 use crate::shared::geometry::row_by_row;
 use crate::shared::robot_pair::RobotPair;
 use gridweave_runtime::ros::{Alignment, Header, RobotFrame, RobotFrames, RobotGroup, UnmergedRobot, Verdict};
@@ -23,7 +23,7 @@ pub(super) fn robot_frames(
         yaw: pose.pose.rotation.angle(),
         covariance: row_by_row(&pose.covariance),
     };
-    let group = |group: &Group| RobotGroup {
+    let group = |group: &PlacedGroup| RobotGroup {
         reference: group.reference.clone(),
         frame_id: format!("{}/{}", RobotFrames::WORLD, group.reference),
         frames: group.frames.iter().map(frame).collect(),

@@ -17,7 +17,7 @@ pub struct Solution {
     /// The robots that are not, with the reason.
     pub unmerged: BTreeMap<String, String>,
     /// Those of them that are connected with each other, by the name of the group's reference.
-    pub groups: Vec<Group>,
+    pub groups: Vec<PlacedGroup>,
     /// Robots whose alignments contradict each other, with the reason.
     pub disputed: BTreeMap<String, String>,
     /// Alignments that their stage accepted and that were left out here, with the reason.
@@ -28,7 +28,7 @@ pub struct Solution {
 
 /// Robots that are connected with each other, but not with the reference.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Group {
+pub struct PlacedGroup {
     /// The robot in whose map frame the others are placed.
     pub reference: String,
     /// `T_reference_robot` for every robot of the group, two at least, including the reference. The covariance is

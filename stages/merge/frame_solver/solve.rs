@@ -3,7 +3,7 @@
 use super::consistency::{EdgeVerdict, judge};
 use super::graph::{Cycle, Edge, Forest};
 use super::reasons;
-use super::solution::{Alignments, Group, OpenCycle, Solution};
+use super::solution::{Alignments, OpenCycle, PlacedGroup, Solution};
 use super::{FrameSolverParameters, UncertainPose, optimize, uncertain::error_vector};
 use crate::shared::robot_pair::RobotPair;
 use gridweave_runtime::ros::Alignment;
@@ -90,7 +90,7 @@ fn other_groups(
     edges: &[Edge],
     placed: &BTreeMap<String, UncertainPose>,
     references: impl Iterator<Item = usize>,
-) -> Vec<Group> {
+) -> Vec<PlacedGroup> {
     let mut tied: BTreeSet<usize> = edges.iter().flat_map(|edge| [edge.a, edge.b]).collect();
     tied.retain(|&robot| !placed.contains_key(names[robot]));
     let mut groups = Vec::new();
@@ -98,7 +98,7 @@ fn other_groups(
         if tied.contains(&root) {
             let frames = place(names, edges, root);
             tied.retain(|&robot| !frames.contains_key(names[robot]));
-            groups.push(Group { reference: names[root].to_owned(), frames });
+            groups.push(PlacedGroup { reference: names[root].to_owned(), frames });
         }
     }
     groups.sort_by(|one, other| one.reference.cmp(&other.reference));

@@ -7,7 +7,7 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 /// Robots whose maps are merged, to be searched as one map.
-pub(super) struct Group {
+pub(super) struct MergedGroup {
     pub(super) number: u64,
     /// `T_group_robot`.
     pub(super) members: BTreeMap<String, Pose2>,
@@ -15,7 +15,7 @@ pub(super) struct Group {
     joint: OnceCell<Option<PreparedMap>>,
 }
 
-impl Group {
+impl MergedGroup {
     pub(super) fn new(number: u64, mut members: BTreeMap<String, Pose2>) -> Self {
         // The frame of a single robot is that of its map.
         if members.len() == 1 {
@@ -50,7 +50,7 @@ impl Group {
 /// All groups. A robot is in one of them at most.
 #[derive(Default)]
 pub(super) struct Groups {
-    groups: Vec<Group>,
+    groups: Vec<MergedGroup>,
     /// Number of the next group.
     next: u64,
 }
@@ -60,7 +60,7 @@ impl Groups {
     pub(super) fn add(&mut self, members: BTreeMap<String, Pose2>) -> u64 {
         let number = self.next;
         self.next += 1;
-        self.groups.push(Group::new(number, members));
+        self.groups.push(MergedGroup::new(number, members));
         number
     }
 
@@ -84,8 +84,8 @@ impl Groups {
 
     /// Removes robots from their groups.
     pub(super) fn leave(&mut self, robots: &[&str]) {
-        let left = |group: &mut Group| robots.iter().any(|robot| group.members.contains_key(*robot));
-        let groups: Vec<Group> = self.groups.extract_if(.., left).collect();
+        let left = |group: &mut MergedGroup| robots.iter().any(|robot| group.members.contains_key(*robot));
+        let groups: Vec<MergedGroup> = self.groups.extract_if(.., left).collect();
         for mut members in groups.into_iter().map(|group| group.members) {
             members.retain(|robot, _| !robots.contains(&robot.as_str()));
             if !members.is_empty() {
@@ -94,18 +94,18 @@ impl Groups {
         }
     }
 
-    pub(super) fn get(&self, number: u64) -> Option<&Group> {
+    pub(super) fn get(&self, number: u64) -> Option<&MergedGroup> {
         self.groups.iter().find(|group| group.number == number)
     }
 
     /// Group of a robot.
-    pub(super) fn of(&self, robot: &str) -> Option<&Group> {
+    pub(super) fn of(&self, robot: &str) -> Option<&MergedGroup> {
         self.groups.iter().find(|group| group.members.contains_key(robot))
     }
 
     /// Numbers of all groups, in the order of their sort keys.
     pub(super) fn by_size(&self) -> Vec<u64> {
-        let mut groups: Vec<&Group> = self.groups.iter().collect();
+        let mut groups: Vec<&MergedGroup> = self.groups.iter().collect();
         groups.sort_by_key(|group| group.rank());
         groups.into_iter().map(|group| group.number).collect()
     }
@@ -124,7 +124,7 @@ mod tests {
     fn a_robot_that_is_left_alone_is_at_the_origin_of_its_own_frame() {
         let members = |robots: &[&str]| {
             let places = robots.iter().map(|robot| ((*robot).to_owned(), pose(1.0, 2.0, 0.5)));
-            Group::new(7, places.collect()).members
+            MergedGroup::new(7, places.collect()).members
         };
         assert_eq!(members(&["a"])["a"], Pose2::identity());
         assert_eq!(members(&["a", "b"])["b"], pose(1.0, 2.0, 0.5));

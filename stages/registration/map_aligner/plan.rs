@@ -1,6 +1,6 @@
 //! Which maps of many robots are searched, so that not every pair must be.
 
-use super::group::{Group, Groups};
+use super::group::{Groups, MergedGroup};
 use super::pair_report::{PairReport, with_reasons};
 use crate::registration::pose_window::PoseWindow;
 use crate::registration::search::{
@@ -209,8 +209,8 @@ impl MergePlan {
     }
 
     /// Window of the relative poses of two groups, by the first robot of each with a known initial pose.
-    fn window(&self, group_a: &Group, group_b: &Group) -> Option<PoseWindow> {
-        let known = |group: &Group| {
+    fn window(&self, group_a: &MergedGroup, group_b: &MergedGroup) -> Option<PoseWindow> {
+        let known = |group: &MergedGroup| {
             let mut poses =
                 group.members.iter().filter_map(|(robot, pose)| Some((*self.initial_poses.get(robot)?, *pose)));
             poses.next()
@@ -269,7 +269,12 @@ impl MergePlan {
 
     /// Pairs with one robot of each group, those with the most wall in common first, for a relative pose of the
     /// groups.
-    fn pairs_in_common(&self, group_a: &Group, group_b: &Group, transform_groups: &Pose2) -> Vec<PairInCommon> {
+    fn pairs_in_common(
+        &self,
+        group_a: &MergedGroup,
+        group_b: &MergedGroup,
+        transform_groups: &Pose2,
+    ) -> Vec<PairInCommon> {
         let mut pairs = Vec::new();
         for (a, to_group_a) in &group_a.members {
             for (b, to_group_b) in &group_b.members {
@@ -357,7 +362,7 @@ impl MergePlan {
         known.map.is_ok().then(|| self.groups.add(BTreeMap::from([(robot.to_owned(), Pose2::identity())])))
     }
 
-    fn map_of<'a>(&'a self, group: &'a Group) -> Option<&'a PreparedMap> {
+    fn map_of<'a>(&'a self, group: &'a MergedGroup) -> Option<&'a PreparedMap> {
         group.map(|robot| self.map(robot))
     }
 

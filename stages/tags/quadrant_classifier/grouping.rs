@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
 /// The group of a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Group {
+pub enum WallGroup {
     /// Within 45 degrees of the first wall, up to half turns.
     First,
     /// The rest.
@@ -17,7 +17,7 @@ pub enum Group {
 ///
 /// The first direction is unchanged and starts the first group; the second group is in the quadrant of the first
 /// direction that belongs to it.
-pub fn classify(angles: &[f64]) -> Vec<(Group, f64)> {
+pub fn classify(angles: &[f64]) -> Vec<(WallGroup, f64)> {
     let Some(&first) = angles.first() else { return Vec::new() };
     let mut second_centre = None;
     angles
@@ -25,11 +25,11 @@ pub fn classify(angles: &[f64]) -> Vec<(Group, f64)> {
         .map(|&angle| {
             let offset = turn_difference(angle, first, PI);
             if offset.abs() <= FRAC_PI_4 {
-                return (Group::First, first + offset);
+                return (WallGroup::First, first + offset);
             }
             let side = turn_difference(angle, first, TAU).signum();
             let centre = *second_centre.get_or_insert(first + side * FRAC_PI_2);
-            (Group::Second, centre + turn_difference(angle, centre, PI))
+            (WallGroup::Second, centre + turn_difference(angle, centre, PI))
         })
         .collect()
 }
@@ -40,13 +40,13 @@ pub fn classify(angles: &[f64]) -> Vec<(Group, f64)> {
 pub(super) fn group_directions(walls: &[WallDirection]) -> Option<[f64; 2]> {
     let angles: Vec<f64> = walls.iter().map(|wall| wall.angle).collect();
     let classified = classify(&angles);
-    let mean = |group: Group| {
+    let mean = |group: WallGroup| {
         let members = || classified.iter().zip(walls).filter(move |((of, _), _)| *of == group);
         let weight: f64 = members().map(|(_, wall)| wall.weight).sum();
         let sum: f64 = members().map(|((_, angle), wall)| angle * wall.weight).sum();
         (weight > 0.0).then(|| sum / weight)
     };
-    match (mean(Group::First), mean(Group::Second)) {
+    match (mean(WallGroup::First), mean(WallGroup::Second)) {
         (Some(first), Some(second)) => Some([first, second]),
         (Some(first), None) => Some([first, first + FRAC_PI_2]),
         (None, Some(second)) => Some([second - FRAC_PI_2, second]),
@@ -95,9 +95,9 @@ mod tests {
                 let half_turns = (brought - angle) / PI;
                 prop_assert!((half_turns - half_turns.round()).abs() < 1e-9);
                 let from_first = turn_difference(brought, angles[0], PI).abs();
-                prop_assert_eq!(group == Group::First, from_first <= FRAC_PI_4);
+                prop_assert_eq!(group == WallGroup::First, from_first <= FRAC_PI_4);
             }
-            for group in [Group::First, Group::Second] {
+            for group in [WallGroup::First, WallGroup::Second] {
                 let members = || classified.iter().filter(move |(of, _)| *of == group).map(|(_, angle)| *angle);
                 let span = members().fold(f64::NEG_INFINITY, f64::max) - members().fold(f64::INFINITY, f64::min);
                 prop_assert!(members().count() == 0 || span <= FRAC_PI_2 + 1e-9);

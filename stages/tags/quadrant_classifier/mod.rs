@@ -25,7 +25,7 @@ mod walls;
 
 pub use direction::{Direction, map_direction};
 pub use first_guess::{FirstGuess, GuessError, first_guess};
-pub use grouping::{Group, classify};
+pub use grouping::{WallGroup, classify};
 pub use parameters::{Mean, QuadrantClassifierParameters, RotationFrom, TagRotationFrom, TranslationFrom, Weighting};
 pub use provisional::provisional_guess;
 pub use quadrant::quadrant;

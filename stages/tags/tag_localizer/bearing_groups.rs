@@ -1,6 +1,6 @@
 //! Bearings of a tag, averaged by the robot's position.
 
-use super::position_groups::{Group, Measurement, PositionGroups};
+use super::position_groups::{Measurement, PositionGroup, PositionGroups};
 use super::{Position, Ray};
 use crate::shared::geometry::wrap_angle;
 use nalgebra::Matrix2;
@@ -54,7 +54,7 @@ impl Measurement for Bearing {
         sums.yaw_variance += self.position.yaw_variance * weight;
     }
 
-    fn agrees(&self, group: &Group<BearingSums>, offset: f64) -> bool {
+    fn agrees(&self, group: &PositionGroup<BearingSums>, offset: f64) -> bool {
         wrap_angle(self.bearing - group.bearing()).abs() < SAME_BEARING * self.stddev + offset / NEAREST
     }
 }
@@ -82,7 +82,7 @@ impl BearingGroups {
     }
 }
 
-impl Group<BearingSums> {
+impl PositionGroup<BearingSums> {
     /// Mean direction, radians.
     fn bearing(&self) -> f64 {
         // Bearings with an infinite deviation have no weight.

@@ -23,7 +23,7 @@ pub trait Measurement {
     fn add_to(&self, sums: &mut Self::Sums, weight: f64);
 
     /// Whether it agrees with the mean of a group, where the robot is `offset` metres from the group's anchor.
-    fn agrees(&self, group: &Group<Self::Sums>, offset: f64) -> bool;
+    fn agrees(&self, group: &PositionGroup<Self::Sums>, offset: f64) -> bool;
 }
 
 /// The measurements of one tag, averaged by position.
@@ -33,7 +33,7 @@ pub trait Measurement {
 /// a separate group, so that an outlier does not spoil a mean.
 #[derive(Clone, Debug, Default)]
 pub struct PositionGroups<S> {
-    groups: Vec<Group<S>>,
+    groups: Vec<PositionGroup<S>>,
     /// Index of the first group at the robot's present position.
     here: usize,
     measurements: u32,
@@ -41,7 +41,7 @@ pub struct PositionGroups<S> {
 
 /// Weighted sums over the measurements of one group.
 #[derive(Clone, Copy, Debug)]
-pub struct Group<S> {
+pub struct PositionGroup<S> {
     /// Where the robot was at the first measurement at this position.
     pub(super) anchor: Point2,
     /// Sum of the weights: those are inverse variances of what is measured.
@@ -74,7 +74,7 @@ impl<S> PositionGroups<S> {
             None => {
                 let (offset, pose_covariance) = (Vector2::zeros(), Matrix2::zeros());
                 let sums = measurement.no_sums();
-                self.groups.push(Group { anchor, weight: 0.0, offset, pose_covariance, sums });
+                self.groups.push(PositionGroup { anchor, weight: 0.0, offset, pose_covariance, sums });
                 self.groups.len() - 1
             }
         };
@@ -91,7 +91,7 @@ impl<S> PositionGroups<S> {
         self.measurements
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Group<S>> {
+    pub(super) fn iter(&self) -> impl Iterator<Item = &PositionGroup<S>> {
         self.groups.iter()
     }
 
@@ -100,7 +100,7 @@ impl<S> PositionGroups<S> {
     ///
     /// The correlation of the errors of the poses is unknown. If it is full, the error of the tag is theirs; in any
     /// case a mean of errors varies by no more than the mean of their variances.
-    pub(super) fn mean_pose_covariance(&self, variance: impl Fn(&Group<S>) -> f64) -> Matrix2<f64> {
+    pub(super) fn mean_pose_covariance(&self, variance: impl Fn(&PositionGroup<S>) -> f64) -> Matrix2<f64> {
         let mut sum = Matrix2::zeros();
         let mut weights = 0.0;
         for group in &self.groups {
@@ -112,7 +112,7 @@ impl<S> PositionGroups<S> {
     }
 }
 
-impl<S> Group<S> {
+impl<S> PositionGroup<S> {
     /// Mean place of the robot.
     pub(super) fn place(&self) -> Point2 {
         self.anchor + self.offset / self.weight

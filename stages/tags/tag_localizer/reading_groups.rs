@@ -1,6 +1,6 @@
 //! Range readings of a tag, averaged by the robot's position.
 
-use super::position_groups::{Group, Measurement, PositionGroups};
+use super::position_groups::{Measurement, PositionGroup, PositionGroups};
 use super::{Position, Ring};
 use nalgebra::Matrix2;
 
@@ -41,7 +41,7 @@ impl Measurement for Reading {
         *sum += self.range * weight;
     }
 
-    fn agrees(&self, group: &Group<f64>, offset: f64) -> bool {
+    fn agrees(&self, group: &PositionGroup<f64>, offset: f64) -> bool {
         (group.range() - self.range).abs() < SAME_RANGE * self.stddev + offset
     }
 }
@@ -64,7 +64,7 @@ impl ReadingGroups {
     }
 }
 
-impl Group<f64> {
+impl PositionGroup<f64> {
     /// Mean distance to the tag, metres.
     fn range(&self) -> f64 {
         self.sums / self.weight

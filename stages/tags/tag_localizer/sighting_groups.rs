@@ -1,6 +1,6 @@
 //! Sightings of a tag, averaged by the robot's position.
 
-use super::position_groups::{Group, Measurement, PositionGroups};
+use super::position_groups::{Measurement, PositionGroup, PositionGroups};
 use super::{Position, Ring};
 use crate::shared::geometry::Point2;
 use nalgebra::{Matrix2, Vector2};
@@ -49,7 +49,7 @@ impl Measurement for Sighting {
     }
 
     /// All sightings at one position are averaged.
-    fn agrees(&self, _: &Group<SightingSums>, _: f64) -> bool {
+    fn agrees(&self, _: &PositionGroup<SightingSums>, _: f64) -> bool {
         true
     }
 }
@@ -74,7 +74,7 @@ impl SightingGroups {
     }
 }
 
-impl Group<SightingSums> {
+impl PositionGroup<SightingSums> {
     /// Mean position of the tag.
     fn seen(&self) -> Point2 {
         self.sums.first + self.sums.offset / self.weight

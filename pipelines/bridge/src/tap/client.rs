@@ -4,7 +4,7 @@ use super::super::network::Network;
 use super::super::presence::{Presence, Role, watch};
 use super::super::wire::{from_bytes, to_bytes};
 use super::super::zenoh_session::{in_words, is_connected};
-use super::requests::{Answer, Link, Passed, Request, State};
+use super::requests::{Passed, Request, State, TapAnswer, TapLink};
 use gridweave_runtime::pipeline::{named_link, suggest};
 use gridweave_runtime::stage::StageError;
 use std::collections::BTreeSet;
@@ -29,7 +29,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 
 /// The settings of a tap.
 #[derive(Clone, Debug)]
-pub(super) struct Settings {
+pub(super) struct TapSettings {
     pub(super) network: Network,
     /// The name of the sender.
     pub(super) sender: String,
@@ -41,9 +41,9 @@ pub(super) struct Settings {
 
 /// An event of a tap.
 #[derive(Debug)]
-pub(super) enum Event {
+pub(super) enum TapEvent {
     /// The link was found.
-    Found(Link),
+    Found(TapLink),
     Passed(Vec<Passed>),
     /// The number of further missed messages.
     Missed(u64),
@@ -56,7 +56,7 @@ pub(super) enum Event {
 
 /// A tapped link, until this is dropped.
 pub(super) struct Client {
-    pub(super) events: Receiver<Event>,
+    pub(super) events: Receiver<TapEvent>,
     is_stopped: Arc<AtomicBool>,
     /// Closed when the thread ends.
     thread: Receiver<()>,
@@ -67,7 +67,7 @@ impl Client {
     ///
     /// # Errors
     /// The thread cannot be started.
-    pub(super) fn start(settings: Settings) -> Result<Self, StageError> {
+    pub(super) fn start(settings: TapSettings) -> Result<Self, StageError> {
         let (to, events) = sync_channel(BATCHES);
         let (running, thread) = sync_channel::<()>(0);
         let is_stopped = Arc::<AtomicBool>::default();
@@ -110,8 +110,8 @@ impl From<StageError> for Over {
 }
 
 struct Poller {
-    settings: Settings,
-    events: SyncSender<Event>,
+    settings: TapSettings,
+    events: SyncSender<TapEvent>,
     is_stopped: Arc<AtomicBool>,
     /// The time until which the sender must be found; none if unlimited, and once it was found.
     until: Option<Instant>,
@@ -144,8 +144,8 @@ impl Poller {
         // The reader may be gone.
         drop(match over {
             Over::Stopped => Ok(()),
-            Over::Ended => self.events.send(Event::Ended),
-            Over::Failed(error) => self.events.send(Event::Failed(error)),
+            Over::Ended => self.events.send(TapEvent::Ended),
+            Over::Failed(error) => self.events.send(TapEvent::Failed(error)),
         });
     }
 
@@ -158,10 +158,10 @@ impl Poller {
     }
 
     fn notify(&self, text: String) -> Result<(), Over> {
-        self.send(Event::Notice(text))
+        self.send(TapEvent::Notice(text))
     }
 
-    fn send(&self, event: Event) -> Result<(), Over> {
+    fn send(&self, event: TapEvent) -> Result<(), Over> {
         self.events.send(event).map_err(|_| Over::Stopped)
     }
 
@@ -243,7 +243,7 @@ impl Poller {
     }
 
     fn nobody(&self, senders: &Senders) -> StageError {
-        let Settings { network, sender, .. } = &self.settings;
+        let TapSettings { network, sender, .. } = &self.settings;
         let senders = senders.lock().unwrap_or_else(PoisonError::into_inner);
         let names: BTreeSet<&str> = senders.iter().map(|sender| sender.name.as_str()).collect();
         let names: Vec<&str> = names.into_iter().collect();
@@ -270,7 +270,7 @@ impl Poller {
         let wrong = |text: String| StageError::new(self.doing(), text).of_parameter("link");
         let link = answer.links[named_link(&self.settings.link, &run, &links).map_err(wrong)?].clone();
         request.link = format!("{}.{}", link.stage, link.output);
-        self.send(Event::Found(link))?;
+        self.send(TapEvent::Found(link))?;
         self.until = None;
         let mut missed = 0;
         loop {
@@ -285,10 +285,10 @@ impl Poller {
             // A repeated batch was taken already.
             if answer.number > self.taken {
                 self.taken = answer.number;
-                self.send(Event::Passed(answer.passed))?;
+                self.send(TapEvent::Passed(answer.passed))?;
             }
             if answer.missed > missed {
-                self.send(Event::Missed(answer.missed - missed))?;
+                self.send(TapEvent::Missed(answer.missed - missed))?;
                 missed = answer.missed;
             }
             if answer.state == State::Ended {
@@ -304,10 +304,10 @@ impl Poller {
         sender: &Presence,
         request: &Request,
         is_present: &dyn Fn() -> bool,
-    ) -> Result<Option<Answer>, Over> {
+    ) -> Result<Option<TapAnswer>, Over> {
         for _ in 0..ATTEMPTS {
             match self.ask(session, sender, request)? {
-                Some(Answer { state: State::Refused, text, .. }) => {
+                Some(TapAnswer { state: State::Refused, text, .. }) => {
                     let cause = format!("the machine refuses that: {text}");
                     return Err(StageError::new(self.doing(), cause).into());
                 }
@@ -323,7 +323,7 @@ impl Poller {
     }
 
     /// Sends a request; none if there is no answer.
-    fn ask(&self, session: &Session, sender: &Presence, request: &Request) -> Result<Option<Answer>, Over> {
+    fn ask(&self, session: &Session, sender: &Presence, request: &Request) -> Result<Option<TapAnswer>, Over> {
         let failed = |cause: String| StageError::new(self.doing(), cause);
         let asked = session
             .get(sender.key(&self.settings.network.bridge, Role::Sender))

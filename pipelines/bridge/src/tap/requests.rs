@@ -18,7 +18,7 @@ pub(super) struct Request {
 
 /// The answer of a sender.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Answer {
+pub(super) struct TapAnswer {
     pub(super) state: State,
     /// The number of the opening: another one each time that the link is opened.
     pub(super) opening: u64,
@@ -27,14 +27,14 @@ pub(super) struct Answer {
     /// The number of missed messages of this opening.
     pub(super) missed: u64,
     /// The list of links, if it was requested.
-    pub(super) links: Vec<Link>,
+    pub(super) links: Vec<TapLink>,
     /// The messages.
     pub(super) passed: Vec<Passed>,
     /// The reason of a refusal, for people.
     pub(super) text: String,
 }
 
-impl Answer {
+impl TapAnswer {
     /// An answer without messages.
     pub(super) fn nothing(state: State, text: impl Into<String>) -> Self {
         Self { state, opening: 0, number: 0, missed: 0, links: Vec::new(), passed: Vec::new(), text: text.into() }
@@ -54,7 +54,7 @@ pub(super) enum State {
 
 /// A link of a sender's run.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Link {
+pub(super) struct TapLink {
     pub(super) stage: String,
     pub(super) output: String,
     /// The ROS 2 type of its messages; empty for any.

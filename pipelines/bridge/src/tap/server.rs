@@ -4,7 +4,7 @@ use super::super::presence::{Presence, Role, watch};
 use super::super::wire::{from_bytes, to_bytes};
 use super::super::zenoh_session::in_words;
 use super::message_queue::Limits;
-use super::requests::{Answer, Request, State};
+use super::requests::{Request, State, TapAnswer};
 use super::sessions::TapSessions;
 use gridweave_runtime::stage::{RunLinks, StageError};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -18,7 +18,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(5);
 /// The time that the end of the run waits for taps to request the last messages.
 const LINGER: Duration = Duration::from_secs(2);
 
-enum Event {
+enum ServerEvent {
     Asked(Query),
     Left(u64),
     Stop,
@@ -26,7 +26,7 @@ enum Event {
 
 /// The server of a sender for taps of its run's links.
 pub(in super::super) struct Taps {
-    events: Sender<Event>,
+    events: Sender<ServerEvent>,
     thread: Option<JoinHandle<()>>,
     _queryable: Queryable<()>,
 }
@@ -46,13 +46,13 @@ impl Taps {
         let (events, received) = channel();
         // A request that arrives while the thread ends is not answered.
         let asked = events.clone();
-        let take = move |query: Query| drop(asked.send(Event::Asked(query)));
+        let take = move |query: Query| drop(asked.send(ServerEvent::Asked(query)));
         let queryable = session.declare_queryable(key.clone()).callback(take).wait();
         let queryable = queryable.map_err(|error| StageError::new("answer taps", in_words(&error)))?;
         let left = events.clone();
         watch(session, bridge, Role::Tapper, move |tapper, is_present| {
             if !is_present {
-                drop(left.send(Event::Left(tapper.number)));
+                drop(left.send(ServerEvent::Left(tapper.number)));
             }
         })?;
         let thread = thread::Builder::new().name("bridge taps".to_owned());
@@ -66,7 +66,7 @@ impl Taps {
 
 impl Drop for Taps {
     fn drop(&mut self) {
-        drop(self.events.send(Event::Stop));
+        drop(self.events.send(ServerEvent::Stop));
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
@@ -76,7 +76,7 @@ impl Drop for Taps {
 struct Worker {
     key: String,
     sessions: TapSessions<Query>,
-    events: Receiver<Event>,
+    events: Receiver<ServerEvent>,
 }
 
 impl Worker {
@@ -96,9 +96,9 @@ impl Worker {
             false => self.events.recv_timeout(POLL_INTERVAL),
         };
         match event {
-            Ok(Event::Asked(query)) => self.take(query),
-            Ok(Event::Left(tapper)) => self.sessions.remove(tapper),
-            Ok(Event::Stop) | Err(RecvTimeoutError::Disconnected) => return false,
+            Ok(ServerEvent::Asked(query)) => self.take(query),
+            Ok(ServerEvent::Left(tapper)) => self.sessions.remove(tapper),
+            Ok(ServerEvent::Stop) | Err(RecvTimeoutError::Disconnected) => return false,
             Err(RecvTimeoutError::Timeout) => {}
         }
         for (query, answer) in self.sessions.poll(Instant::now()) {
@@ -111,14 +111,14 @@ impl Worker {
         let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
         let answer = match from_bytes::<Request>(&bytes) {
             Ok(request) => self.sessions.request(&request, query, Instant::now()),
-            Err(wrong) => Some((query, Answer::nothing(State::Refused, wrong))),
+            Err(wrong) => Some((query, TapAnswer::nothing(State::Refused, wrong))),
         };
         if let Some((query, answer)) = answer {
             self.reply(&query, &answer);
         }
     }
 
-    fn reply(&self, query: &Query, answer: &Answer) {
+    fn reply(&self, query: &Query, answer: &TapAnswer) {
         let replied = to_bytes(answer)
             .and_then(|bytes| query.reply(self.key.as_str(), bytes).wait().map_err(|error| in_words(&error)));
         if let Err(wrong) = replied {

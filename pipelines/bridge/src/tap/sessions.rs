@@ -1,7 +1,7 @@
 //! The sessions of taps at a sender, independent of the network.
 
 use super::message_queue::{Limits, MessageQueue};
-use super::requests::{Answer, Link, Request, State};
+use super::requests::{Request, State, TapAnswer, TapLink};
 use gridweave_runtime::stage::{LinkView, RunLinks};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -32,7 +32,7 @@ struct Opening<R> {
     view: View,
     queue: MessageQueue,
     /// The last batch, until it is acknowledged.
-    last: Option<Answer>,
+    last: Option<TapAnswer>,
     /// The number of batches.
     batches: u64,
     asked: Instant,
@@ -58,26 +58,26 @@ impl<R> TapSessions<R> {
     }
 
     /// Handles a request. Returns the answer if it is known at once; otherwise [`poll`](Self::poll) returns it later.
-    pub(super) fn request(&mut self, request: &Request, asks: R, now: Instant) -> Option<(R, Answer)> {
+    pub(super) fn request(&mut self, request: &Request, asks: R, now: Instant) -> Option<(R, TapAnswer)> {
         let links = match &self.links {
             Ok(links) => links,
-            Err(why) => return Some((asks, Answer::nothing(State::Refused, *why))),
+            Err(why) => return Some((asks, TapAnswer::nothing(State::Refused, *why))),
         };
         if request.link.is_empty() {
-            let link = |link: &gridweave_runtime::stage::RunLink| Link {
+            let link = |link: &gridweave_runtime::stage::RunLink| TapLink {
                 stage: link.stage.clone(),
                 output: link.output.clone(),
                 ros_type: link.ros_type.clone(),
                 definition: link.definition.clone(),
             };
             let links = links.all().iter().map(link).collect();
-            return Some((asks, Answer { links, ..Answer::nothing(State::GoesOn, "") }));
+            return Some((asks, TapAnswer { links, ..TapAnswer::nothing(State::GoesOn, "") }));
         }
         let is_meant =
             |link: &gridweave_runtime::stage::RunLink| format!("{}.{}", link.stage, link.output) == request.link;
         let Some(link) = links.all().iter().position(is_meant) else {
             let text = format!("the run has no link `{}`", request.link);
-            return Some((asks, Answer::nothing(State::Refused, text)));
+            return Some((asks, TapAnswer::nothing(State::Refused, text)));
         };
         let known = self.open.get_mut(&request.tapper);
         let known = known.filter(|open| open.link == link && open.number == request.opening);
@@ -117,7 +117,7 @@ impl<R> TapSessions<R> {
     }
 
     /// Takes the messages since the last call. Returns the answers that are due.
-    pub(super) fn poll(&mut self, now: Instant) -> Vec<(R, Answer)> {
+    pub(super) fn poll(&mut self, now: Instant) -> Vec<(R, TapAnswer)> {
         let Ok(links) = &self.links else { return Vec::new() };
         let is_over = self.is_over;
         let mut answers = Vec::new();
@@ -127,7 +127,7 @@ impl<R> TapSessions<R> {
             }
             let looked = if is_over { Ok(()) } else { open.look(links, now) };
             if let Err(why) = looked {
-                answers.extend(open.asks.take().map(|asks| (asks, Answer::nothing(State::Refused, why))));
+                answers.extend(open.asks.take().map(|asks| (asks, TapAnswer::nothing(State::Refused, why))));
                 return false;
             }
             let is_held = now.saturating_duration_since(open.asked) >= HOLD;
@@ -152,7 +152,7 @@ impl<R> Opening<R> {
     }
 
     /// Continues with a request: it waits for more messages, or gets the last batch again if it has not received it.
-    fn again(&mut self, taken: u64, asks: R) -> Option<(R, Answer)> {
+    fn again(&mut self, taken: u64, asks: R) -> Option<(R, TapAnswer)> {
         if taken == self.batches {
             self.last = None;
             self.asks = Some(asks);
@@ -184,14 +184,14 @@ impl<R> Opening<R> {
         view.take(&mut |message| waiting.push(&message)).map_err(|error| error.to_string())
     }
 
-    fn answer(&mut self, is_over: bool) -> Answer {
+    fn answer(&mut self, is_over: bool) -> TapAnswer {
         let passed = self.queue.batch();
         self.batches += u64::from(!passed.is_empty());
         let missed = match &self.view {
             View::Awaited(..) => 0,
             View::Open(view) => view.missed(),
         };
-        let answer = Answer {
+        let answer = TapAnswer {
             state: if is_over && self.queue.is_empty() { State::Ended } else { State::GoesOn },
             opening: self.number,
             number: self.batches,

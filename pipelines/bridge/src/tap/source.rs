@@ -4,8 +4,8 @@ use super::super::certificates::Certificates;
 use super::super::network::{BASE, Network, is_part_of_key};
 use super::super::source::channel_of;
 use super::super::wire::Form;
-use super::client::{Client, Event, Settings};
-use super::requests::{Link, Passed};
+use super::client::{Client, TapEvent, TapSettings};
+use super::requests::{Passed, TapLink};
 use gridweave_runtime::message::{Channel, MessageHeader};
 use gridweave_runtime::stage::{
     AnyMessage, Context, Out, Output, OutputPorts, Outputs, ParameterError, Parameters, Source, StageError, StageKind,
@@ -110,21 +110,21 @@ impl Outputs for Ports {
 struct BridgeTap {
     client: Client,
     /// The received event that was not handled yet.
-    waiting: Option<Event>,
-    link: Link,
+    waiting: Option<TapEvent>,
+    link: TapLink,
     /// The local numbers of channels, by their number at the sender and topic.
     channels: BTreeMap<(u32, String), u32>,
 }
 
 impl BridgeTap {
     fn new(parameters: TapParameters, _: &Context) -> Result<Self, StageError> {
-        let settings = Settings {
+        let settings = TapSettings {
             network: parameters.network(),
             sender: parameters.sender,
             link: parameters.link,
             wait: parameters.wait.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok()),
         };
-        let (link, channels) = (Link::default(), BTreeMap::new());
+        let (link, channels) = (TapLink::default(), BTreeMap::new());
         Ok(Self { client: Client::start(settings)?, waiting: None, link, channels })
     }
 
@@ -171,7 +171,7 @@ impl Source for BridgeTap {
             self.waiting = match self.client.events.recv_timeout(longest) {
                 Ok(event) => Some(event),
                 Err(RecvTimeoutError::Timeout) => None,
-                Err(RecvTimeoutError::Disconnected) => Some(Event::Ended),
+                Err(RecvTimeoutError::Disconnected) => Some(TapEvent::Ended),
             };
         }
     }
@@ -179,19 +179,19 @@ impl Source for BridgeTap {
     fn next(&mut self, output: &Output<Ports>) -> Result<bool, StageError> {
         let event = self.waiting.take().map_or_else(|| self.client.events.try_recv(), Ok);
         match event {
-            Ok(Event::Found(link)) => self.link = link,
-            Ok(Event::Passed(passed)) => passed.into_iter().try_for_each(|passed| self.send(passed, output))?,
-            Ok(Event::Missed(messages)) => {
+            Ok(TapEvent::Found(link)) => self.link = link,
+            Ok(TapEvent::Passed(passed)) => passed.into_iter().try_for_each(|passed| self.send(passed, output))?,
+            Ok(TapEvent::Missed(messages)) => {
                 output.count(bridge_counts::MISSED, messages);
                 output.warn("messages were missed, because the tap was too slow");
             }
-            Ok(Event::Notice(text)) => {
+            Ok(TapEvent::Notice(text)) => {
                 tracing::warn!("{text}");
                 output.warn(text);
             }
-            Ok(Event::Failed(error)) => return Err(error),
+            Ok(TapEvent::Failed(error)) => return Err(error),
             Err(TryRecvError::Empty) => {}
-            Ok(Event::Ended) | Err(TryRecvError::Disconnected) => return Ok(false),
+            Ok(TapEvent::Ended) | Err(TryRecvError::Disconnected) => return Ok(false),
         }
         Ok(true)
     }

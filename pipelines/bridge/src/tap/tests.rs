@@ -1,7 +1,7 @@
 //! Tap sessions with links whose messages the tests control.
 
 use super::message_queue::Limits;
-use super::requests::{Answer, Request, State};
+use super::requests::{Request, State, TapAnswer};
 use super::sessions::TapSessions;
 use gridweave_runtime::message::{Message, MessageFlags, MessageHeader};
 use gridweave_runtime::stage::{LinkView, RunLink, RunLinks, StageError};
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 /// What is known of the one link of a run.
 #[derive(Debug, Default)]
-struct Link {
+struct TestLink {
     is_made: bool,
     is_broken: bool,
     /// The numbers of the messages that have passed, and were not taken.
@@ -21,7 +21,7 @@ struct Link {
     viewers: usize,
 }
 
-type SharedLink = Arc<Mutex<Link>>;
+type SharedLink = Arc<Mutex<TestLink>>;
 
 struct Viewer(SharedLink);
 
@@ -52,7 +52,7 @@ impl Drop for Viewer {
 /// Sessions with the link `slam.map` and the link `slam.pose`, of which nothing is known, and answers what it was asked
 /// by the number of the question.
 fn sessions(limits: Limits) -> (TapSessions<u32>, SharedLink) {
-    let link = Arc::new(Mutex::new(Link { is_made: true, ..Default::default() }));
+    let link = Arc::new(Mutex::new(TestLink { is_made: true, ..Default::default() }));
     let named = |output: &str| RunLink { stage: "slam".into(), output: output.into(), ..Default::default() };
     let of_open = Arc::clone(&link);
     let links = RunLinks::new([named("map"), named("pose")], move |index| {
@@ -82,16 +82,16 @@ fn viewers(link: &SharedLink) -> usize {
 
 /// The one answer, and what it says: the opening, the batch, and the messages.
 #[track_caller]
-fn said(answers: &[(u32, Answer)], asked: u32) -> (u64, u64, Vec<u64>) {
+fn said(answers: &[(u32, TapAnswer)], asked: u32) -> (u64, u64, Vec<u64>) {
     let [(to, answer)] = answers else { panic!("{answers:?}") };
     assert_eq!((*to, &answer.text), (asked, &String::new()));
     (answer.opening, answer.number, answer.passed.iter().map(|passed| passed.sequence).collect())
 }
 
 #[track_caller]
-fn refusal(answers: impl IntoIterator<Item = (u32, Answer)>) -> String {
+fn refusal(answers: impl IntoIterator<Item = (u32, TapAnswer)>) -> String {
     let answers: Vec<_> = answers.into_iter().collect();
-    let [(_, Answer { state: State::Refused, text, .. })] = answers.as_slice() else { panic!("{answers:?}") };
+    let [(_, TapAnswer { state: State::Refused, text, .. })] = answers.as_slice() else { panic!("{answers:?}") };
     text.clone()
 }
 
