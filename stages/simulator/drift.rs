@@ -1,4 +1,4 @@
-//! PoseDrift of a SLAM system's poses.
+//! Drift of a SLAM system's poses.
 //!
 //! Heading and distance have random walks over the driven distance, and the accumulated error decays over a length,
 //! as loop closures correct drift. The error of every coordinate is thus a mean-reverting random walk (an

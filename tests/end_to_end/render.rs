@@ -1,19 +1,12 @@
 //! Pictures of logs and map files.
 
-use crate::support::{MARKUP, gridweave, merged_log};
+use crate::support::{MARKUP, gridweave, merged_folder};
 use gridweave_logs::picture::robot_colour;
 use std::fs;
-use tempfile::TempDir;
-
-fn folder() -> TempDir {
-    let folder = TempDir::new().unwrap();
-    merged_log(&folder.path().join("merged.mcap"));
-    folder
-}
 
 #[test]
 fn a_picture_is_written_in_the_format_of_its_name_and_is_the_same_every_time() {
-    let folder = folder();
+    let folder = merged_folder();
     for (name, magic) in [("a.png", &b"\x89PNG"[..]), ("a.SVG", b"<svg"), ("a.pdf", b"%PDF")] {
         let args = ["render", "merged.mcap", "-o", name, "--show", "all", "--grid", "1"];
         let says = "robot1, robot2 aligned, and <script>alert(1)<&'\" beside them";
@@ -34,7 +27,7 @@ fn a_picture_is_written_in_the_format_of_its_name_and_is_the_same_every_time() {
 
 #[test]
 fn maps_are_drawn_merged_apart_and_one_by_one() {
-    let folder = folder();
+    let folder = merged_folder();
     let width = |args: &[&str]| {
         gridweave(folder.path(), &[&["render", "merged.mcap", "-o", "a.png"], args].concat()).assert(0, &[]);
         let picture = image::open(folder.path().join("a.png")).unwrap().to_rgb8();
@@ -50,7 +43,7 @@ fn maps_are_drawn_merged_apart_and_one_by_one() {
 
 #[test]
 fn inputs_that_cannot_be_drawn_are_errors() {
-    let folder = folder();
+    let folder = merged_folder();
     let refused = |args: &[&str], words: &str| {
         gridweave(folder.path(), &[&["render", "merged.mcap"], args].concat()).assert(2, &[words]);
     };

@@ -1,15 +1,9 @@
 //! The page that a report is.
 
-use crate::support::{MARKUP, gridweave, merged_log};
+use crate::support::{MARKUP, gridweave, merged_folder};
 use serde_json::Value;
 use std::fs;
 use tempfile::TempDir;
-
-fn folder() -> TempDir {
-    let folder = TempDir::new().unwrap();
-    merged_log(&folder.path().join("merged.mcap"));
-    folder
-}
 
 fn page(folder: &TempDir) -> String {
     fs::read_to_string(folder.path().join("report.html")).unwrap()
@@ -23,7 +17,7 @@ fn data(page: &str) -> Value {
 
 #[test]
 fn a_report_holds_what_the_log_does_moment_by_moment() {
-    let folder = folder();
+    let folder = merged_folder();
     let args = ["report", "merged.mcap", "-o", "report.html"];
     gridweave(folder.path(), &args).assert(0, &["wrote report.html", "open it in a browser"]);
     let page = page(&folder);
@@ -55,7 +49,7 @@ fn a_report_holds_what_the_log_does_moment_by_moment() {
 
 #[test]
 fn the_summary_of_the_run_adds_what_stages_did() {
-    let folder = folder();
+    let folder = merged_folder();
     let stage = r#"{"messages_in": 7, "messages_out": 3, "busy_ms": 12.5, "warnings": {"a map was left out": 2}}"#;
     fs::write(folder.path().join("summary.json"), format!(r#"{{"stages": {{"icp": {stage}}}}}"#)).unwrap();
     let args = ["report", "merged.mcap", "-o", "report.html", "--summary", "summary.json"];
@@ -66,7 +60,7 @@ fn the_summary_of_the_run_adds_what_stages_did() {
 
 #[test]
 fn inputs_that_cannot_be_reported_are_errors() {
-    let folder = folder();
+    let folder = merged_folder();
     let refused = |args: &[&str], status: i32, words: &str| {
         gridweave(folder.path(), &[&["report", "-o", "report.html"], args].concat()).assert(status, &[words]);
         assert!(!folder.path().join("report.html").exists());

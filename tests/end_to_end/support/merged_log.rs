@@ -7,6 +7,7 @@ use gridweave_runtime::ros::{
     TopologicalPath, UnmergedRobot, Verdict, Verdicts,
 };
 use nalgebra::{Isometry2, Vector2};
+use tempfile::TempDir;
 
 /// A robot whose name is markup.
 pub(crate) const MARKUP: &str = "<script>alert(1)<&'\"";
@@ -21,10 +22,12 @@ fn frame(robot: &str, x: f64, y: f64, yaw: f64) -> RobotFrame {
     RobotFrame { robot: robot.into(), frame_id: format!("{robot}/map"), x, y, yaw, covariance }
 }
 
-/// `robot1` and `robot2` are merged after ten seconds, a robot of a strange name is not.
-pub(crate) fn merged_log(path: &std::path::Path) {
+/// A folder with the log `merged.mcap`: `robot1` and `robot2` are merged after ten seconds, a robot of a strange name is
+/// not.
+pub(crate) fn merged_folder() -> TempDir {
+    let folder = TempDir::new().unwrap();
     let room = TestMap::room();
-    let mut log = LogBuilder::new(path);
+    let mut log = LogBuilder::new(&folder.path().join("merged.mcap"));
     for robot in ["robot1", "robot2", MARKUP] {
         log.map(0.0, robot, &room).pose(0.0, robot, 1.0, 1.0).pose(1.0, robot, 2.0, 1.5);
     }
@@ -94,4 +97,5 @@ pub(crate) fn merged_log(path: &std::path::Path) {
     map("/map", 10.0, &room, &mut log);
     map("/map_conflicts", 10.0, &room, &mut log);
     log.finish();
+    folder
 }

@@ -11,7 +11,7 @@ pub(crate) use gridweave_tests::run_files::{
 };
 pub(crate) use gridweave_tests::{LogBuilder, TestMap};
 pub(crate) use live_run::{LOG, OUTPUT, POSES, RECEIVE, Run, TROUBLED, counts, read};
-pub(crate) use merged_log::{MARKUP, merged_log};
+pub(crate) use merged_log::{MARKUP, merged_folder};
 pub(crate) use readings::{change_log, change_readings, moved_reading, place_in_map_2};
 pub(crate) use simulated_world::SimulatedWorld;
 use std::io::Read;

@@ -1,7 +1,8 @@
 //! The method on drawn maps, and the stage as a whole.
 
 use super::*;
-use gridweave_stages::shared::geometry::{Grid, GridGeometry, pose, turn_difference};
+use crate::pair_aligner::test_maps::{check_extreme_maps, named};
+use gridweave_stages::shared::geometry::turn_difference;
 use gridweave_stages::shared::test_world::floor_plan::{Drawing, DrawnMap, FloorPlan, apart, drawing, seen};
 use nalgebra::UnitComplex;
 use proptest::prelude::*;
@@ -19,10 +20,6 @@ fn corner(yaw: f64) -> Vec<[f64; 2]> {
         (0..200).map(|index| (0.05 * f64::from(index), 0.0)).chain((0..90).map(|index| (0.0, 0.05 * f64::from(index))));
     let turn = UnitComplex::new(yaw);
     arms.map(|(x, y)| (turn * nalgebra::Vector2::new(x, y)).into()).collect()
-}
-
-fn named<'a>(robot: &'a str, map: &'a DrawnMap) -> NamedMap<'a> {
-    NamedMap { robot, grid: Grid::new(map.geometry, &map.cells).unwrap() }
 }
 
 fn align(a: &DrawnMap, b: &DrawnMap) -> Vec<RatedPose> {
@@ -120,20 +117,7 @@ fn the_covariance_is_that_of_the_place_in_the_middle_of_the_map() {
 #[test]
 fn maps_without_walls_and_too_large_ones_are_refused_and_a_single_cell_fits_anywhere() {
     let office = FloorPlan::office().draw(seen(-0.2, -0.2, 20.2, 12.2), drawing(3.0, 2.0, 0.4));
-    let geometry = GridGeometry { width: 10, height: 10, resolution: 0.05, origin: pose(1e6, -1e6, 0.3) };
-    let (empty, mut cells) = ([0; 100], [0; 100]);
-    cells[37] = 100;
-    let [empty, one_cell] =
-        [&empty, &cells].map(|cells| NamedMap { robot: "b", grid: Grid::new(geometry, cells).unwrap() });
-    let office = named("a", &office);
-    let parameters = HoughSpectrumParameters::default();
-    let refusal = align_spectra(&office, &empty, &parameters).unwrap_err();
-    assert_eq!(refusal.to_string(), "the map of b has no walls");
-    for (a, b) in [(&office, &one_cell), (&one_cell, &office), (&one_cell, &one_cell)] {
-        let found = align_spectra(a, b, &parameters).unwrap();
-        assert!(found.iter().all(|one| one.covariance.iter().all(|value| value.is_finite())), "{found:?}");
-    }
-    let small = HoughSpectrumParameters { max_extent: 15.0, ..parameters };
-    let refusal = align_spectra(&office, &one_cell, &small).unwrap_err();
-    assert!(refusal.to_string().contains("longer than 15 m"), "{refusal}");
+    check_extreme_maps(&office, 0, |a, b, max_extent| {
+        align_spectra(a, b, &HoughSpectrumParameters { max_extent, ..Default::default() })
+    });
 }

@@ -12,6 +12,8 @@
 mod criterion;
 mod rated_pose;
 mod stage;
+#[cfg(test)]
+pub(crate) mod test_maps;
 
 pub use criterion::{Criterion, Judgement};
 pub use rated_pose::{RatedPose, known_area};

@@ -1,9 +1,10 @@
 //! The method as a whole, on drawn maps, and the stage from outside.
 
 use super::*;
+use crate::pair_aligner::test_maps::{check_extreme_maps, named};
 use gridweave_runtime::stage::Context;
 use gridweave_stages::registration::search::Raster;
-use gridweave_stages::shared::geometry::{Grid, GridGeometry, pose};
+use gridweave_stages::shared::geometry::{Grid, pose};
 use gridweave_stages::shared::test_world::floor_plan::{DrawnMap, FloorPlan, apart, drawing, seen};
 use gridweave_stages::shared::test_world::stage_bench::StageBench;
 
@@ -25,10 +26,6 @@ const ALL: [f64; 4] = [-0.2, -0.2, 20.2, 12.2];
 
 fn grid(map: &DrawnMap) -> Grid<'_> {
     Grid::new(map.geometry, &map.cells).unwrap()
-}
-
-fn named<'a>(robot: &'a str, map: &'a DrawnMap) -> NamedMap<'a> {
-    NamedMap { robot, grid: grid(map) }
 }
 
 fn classified(map: &DrawnMap) -> ClassifiedMap {
@@ -67,22 +64,9 @@ fn maps_of_one_building_are_aligned_at_any_angle() {
 
 #[test]
 fn maps_without_walls_and_too_large_ones_are_refused_and_a_single_cell_fits_anywhere() {
-    let office = office(ALL, 0.4);
-    let geometry = GridGeometry { width: 10, height: 10, resolution: 0.05, origin: pose(1e6, -1e6, 0.3) };
-    let (empty, mut cells) = ([0; 100], [-1; 100]);
-    cells[37] = 100;
-    let [empty, one_cell] =
-        [&empty, &cells].map(|cells| NamedMap { robot: "b", grid: Grid::new(geometry, cells).unwrap() });
-    let office = named("a", &office);
-    let refusal = align_by_walks(&office, &empty, &quick(), 1).unwrap_err();
-    assert_eq!(refusal.to_string(), "the map of b has no walls");
-    for (a, b) in [(&office, &one_cell), (&one_cell, &office), (&one_cell, &one_cell)] {
-        let found = align_by_walks(a, b, &quick(), 1).unwrap();
-        assert!(found.iter().all(|one| one.covariance.iter().all(|value| value.is_finite())), "{found:?}");
-    }
-    let small = RandomWalkParameters { max_extent: 15.0, ..quick() };
-    let refusal = align_by_walks(&office, &one_cell, &small, 1).unwrap_err();
-    assert!(refusal.to_string().contains("longer than 15 m"), "{refusal}");
+    check_extreme_maps(&office(ALL, 0.4), -1, |a, b, max_extent| {
+        align_by_walks(a, b, &RandomWalkParameters { max_extent, ..quick() }, 1)
+    });
 }
 
 #[test]
