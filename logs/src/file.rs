@@ -14,7 +14,7 @@ pub(crate) use same_file::folder_of;
 pub use same_file::{is_same_file, is_same_name, resolve};
 
 use crate::os_error;
-use gridweave_runtime::left_behind::{self, Registration};
+use gridweave_runtime::left_behind::{self, RegisteredRemoval};
 use rustix::fs::{Access, OFlags, access};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, ErrorKind};
@@ -85,7 +85,7 @@ pub struct OutputFile {
     /// Whether the part is kept on drop.
     is_kept: bool,
     /// The removal of a part that this process has made, should it end at once.
-    _registration: Option<Registration>,
+    _registration: Option<RegisteredRemoval>,
 }
 
 impl OutputFile {
@@ -205,7 +205,7 @@ impl Drop for OutputFile {
 }
 
 /// Registers that a part is removed, unless it has another place or is another file by then.
-fn removal_of(file: &File, part: &Path) -> Option<Registration> {
+fn removal_of(file: &File, part: &Path) -> Option<RegisteredRemoval> {
     let (made, part) = (file.metadata().ok()?, part.to_owned());
     let made = (made.dev(), made.ino());
     Some(left_behind::register(move || {

@@ -17,19 +17,19 @@ static REGISTERED: Mutex<Registered> = Mutex::new(Registered { next: 0, removals
 
 /// The registration of something that is removed if this process ends at once. On drop it is no longer.
 #[derive(Debug)]
-pub struct Registration(u64);
+pub struct RegisteredRemoval(u64);
 
 /// Registers how something is removed. `remove` must register nothing itself.
 #[must_use]
-pub fn register(remove: impl Fn() + Send + 'static) -> Registration {
+pub fn register(remove: impl Fn() + Send + 'static) -> RegisteredRemoval {
     let mut registered = REGISTERED.lock().unwrap_or_else(PoisonError::into_inner);
     let number = registered.next;
     registered.next += 1;
     registered.removals.insert(number, Box::new(remove));
-    Registration(number)
+    RegisteredRemoval(number)
 }
 
-impl Drop for Registration {
+impl Drop for RegisteredRemoval {
     fn drop(&mut self) {
         REGISTERED.lock().unwrap_or_else(PoisonError::into_inner).removals.remove(&self.0);
     }

@@ -8,7 +8,7 @@ use super::links::counters_shape;
 use super::run_lock::{LOCK, Removal, lock_for_removal, lock_for_run};
 use super::run_prefix::{counters_path, is_prefix, is_prefix_of, new_prefix, shared_memory};
 use super::user_folder::{self, OWN_FILE, OWN_FOLDER, is_own};
-use crate::left_behind::{self, Registration};
+use crate::left_behind::{self, RegisteredRemoval};
 use crate::link::{RunNames, SharedCounters};
 use crate::pipeline::Pipeline;
 use std::fs::{self, DirBuilder, File, TryLockError};
@@ -31,7 +31,7 @@ pub struct RunFolder {
     path: PathBuf,
     _lock: File,
     /// Only of the process that removes it.
-    _registration: Option<Registration>,
+    _registration: Option<RegisteredRemoval>,
 }
 
 /// An error with the folder of a run.

@@ -100,28 +100,28 @@ impl LocalMap {
     /// with the deviation from a prior, with weights that fall with the distance (point to line as in Censi 2008, "An
     /// ICP variant using a point-to-line metric").
     pub fn register(&self, scan: &[ScanPoint], guess: &Pose2, prior: (&Pose2, &Matrix3<f64>)) -> Match {
-        let mut registration = Registration::new(self, scan, guess, Some(prior));
-        let equations = registration.equations(RADII[0]);
-        registration.run(equations)
+        let mut moving = MovingScan::new(self, scan, guess, Some(prior));
+        let equations = moving.equations(RADII[0]);
+        moving.run(equations)
     }
 
     /// Registers points by the walls alone. `None` if fewer than [`LEAST_MATCHED`] of them lie on the map. Most scans
     /// share little with the map, which a part of their points at the guess shows.
     pub(super) fn find(&self, scan: &[ScanPoint], guess: &Pose2) -> Option<Match> {
         let sample: Vec<ScanPoint> = scan.iter().step_by(SAMPLE).copied().collect();
-        let at_guess = Registration::new(self, &sample, guess, None).equations(RADII[0]);
+        let at_guess = MovingScan::new(self, &sample, guess, None).equations(RADII[0]);
         if at_guess.matched < LEAST_MATCHED_AT_GUESS {
             return None;
         }
-        let mut registration = Registration::new(self, scan, guess, None);
-        let equations = registration.equations(RADII[0]);
-        let found = registration.run(equations);
+        let mut moving = MovingScan::new(self, scan, guess, None);
+        let equations = moving.equations(RADII[0]);
+        let found = moving.run(equations);
         (found.matched >= LEAST_MATCHED).then_some(found)
     }
 }
 
-/// Points on their way to their place on a map.
-struct Registration<'a> {
+/// A scan on its way to its place on a map.
+struct MovingScan<'a> {
     map: &'a LocalMap,
     scan: &'a [ScanPoint],
     pose: Pose2,
@@ -138,7 +138,7 @@ struct MoveEquations {
     matched: f64,
 }
 
-impl<'a> Registration<'a> {
+impl<'a> MovingScan<'a> {
     fn new(
         map: &'a LocalMap,
         scan: &'a [ScanPoint],

@@ -5,8 +5,8 @@ use nalgebra::Vector3;
 
 /// Most steps of conjugate gradients, each of which takes two products and a fraction of the time of a factorization.
 const MAX_STEPS: usize = 24;
-/// What is left of the error, as a share of the solution, both in the norm of the matrix.
-const LEAST_ERROR: f64 = 1e-6;
+/// Error that is left, as a share of the solution, both in the norm that the factor gives.
+const TOLERANCE: f64 = 1e-6;
 
 /// A factor of one of the matrices, with which the systems of others are solved: by the method of conjugate gradients,
 /// preconditioned with the factor (Golub and Van Loan, "Matrix Computations", section 11.5). Where that takes too many
@@ -40,7 +40,7 @@ fn conjugate_gradients(
     let mut residual = right.to_vec();
     let mut along = preconditioner.solve(&residual);
     let mut error = dot(&residual, &along);
-    let wanted = LEAST_ERROR * LEAST_ERROR * error;
+    let wanted = TOLERANCE * TOLERANCE * error;
     for _ in 0..MAX_STEPS {
         if error <= wanted {
             return Some(solution);
