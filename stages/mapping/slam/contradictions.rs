@@ -3,6 +3,9 @@
 //! A beam that ended somewhere has passed all that lies before. Where a map is doubled or bent, the beams of one visit
 //! pass through the walls of another (Mazuran et al. 2014, "A statistical measure for map consistency in SLAM"). No
 //! truth is needed to see that.
+//!
+//! Some beams pass through railings, hedges and table legs whenever they are looked at, and through where a person was.
+//! Their own time shows it: what scans of the time at which it was seen look through contradicts nothing.
 
 use super::scan_points::ScanPoint;
 use crate::shared::geometry::{Point2, PointIndex, Pose2};
@@ -47,14 +50,23 @@ pub(super) struct PlacedScan<'a> {
     pub(super) drive: usize,
 }
 
+/// A point of a wall.
+struct WallPoint {
+    /// The scan that has seen it.
+    scan: usize,
+    normal: Vector2<f64>,
+    /// How many other scans of its time look through it.
+    passed_in_its_time: u32,
+}
+
 /// The walls of all scans.
 struct Walls<'a> {
     scans: &'a [PlacedScan<'a>],
     /// Least number of scans of one drive between those of other times.
     apart: usize,
     index: PointIndex,
-    /// For each point of the index its scan and its normal.
-    seen: Vec<(usize, Vector2<f64>)>,
+    /// For each point of the index what it is.
+    points: Vec<WallPoint>,
 }
 
 /// Compares each scan with the walls of those that are of other drives, or more than `apart` scans before or after it.
@@ -78,7 +90,16 @@ impl<'a> Walls<'a> {
             }
         }
         let (index, order) = PointIndex::new(&places, STEP);
-        Self { scans, apart, index, seen: order.into_iter().map(|place| unsorted[place]).collect() }
+        let point = |place: usize| {
+            let (scan, normal) = unsorted[place];
+            WallPoint { scan, normal, passed_in_its_time: 0 }
+        };
+        let mut walls = Self { scans, apart, index, points: order.into_iter().map(point).collect() };
+        let passed: Vec<Vec<usize>> = (0..scans.len()).into_par_iter().map(|scan| walls.passed_in_its_time(scan)).collect();
+        for point in passed.into_iter().flatten() {
+            walls.points[point].passed_in_its_time += 1;
+        }
+        walls
     }
 
     /// Whether two scans were made at different times.
@@ -86,42 +107,63 @@ impl<'a> Walls<'a> {
         one.abs_diff(other) > self.apart || self.scans[one].drive != self.scans[other].drive
     }
 
-    /// Whether the beams of a scan pass through walls of other times; `None` if too few meet any.
-    fn is_contradicted(&self, number: usize) -> Option<bool> {
+    /// The beams of a scan that are looked at, from the lidar to their ends.
+    fn beams(&self, number: usize) -> impl Iterator<Item = [Point2; 2]> {
         let scan = &self.scans[number];
-        let lidar = scan.pose * scan.lidar?;
-        let (mut passing, mut meeting) = (0, 0);
-        for point in scan.points.iter().step_by(scan.points.len().div_ceil(BEAMS).max(1)) {
-            let end = scan.pose * point.place;
-            let passes = self.is_passed(number, &lidar, &end);
-            let is_of_other_time = |index: usize| self.are_apart(self.seen[index].0, number);
-            passing += usize::from(passes);
-            meeting += usize::from(passes || self.index.within(&end, END_REACH).any(is_of_other_time));
-        }
-        (meeting >= LEAST_BEAMS).then_some(passing as f64 > MAX_PASSING * meeting as f64)
+        let lidar = scan.lidar.map(|lidar| scan.pose * lidar);
+        let points = scan.points.iter().step_by(scan.points.len().div_ceil(BEAMS).max(1));
+        points.filter_map(move |point| Some([lidar?, scan.pose * point.place]))
     }
 
-    /// Whether a beam passes through a wall of other times that is recorded, or that two scans have seen: what only one has
-    /// seen may have been a person.
-    fn is_passed(&self, number: usize, lidar: &Point2, end: &Point2) -> bool {
+    /// The points of walls that a beam passes through, in the order of the beam.
+    fn passed(&self, [lidar, end]: [Point2; 2]) -> impl Iterator<Item = usize> {
         let way = end - lidar;
         let range = way.norm();
         let along = way / range;
         let steps = ((range - 2.0 * MARGIN) / STEP).max(0.0) as usize;
+        let places = (0..steps).map(move |step| lidar + along * (MARGIN + STEP * step as f64));
+        let points = places.flat_map(|at| self.index.within(&at, REACH).collect::<Vec<_>>());
+        points.filter(move |index| self.points[*index].normal.dot(&along).abs() >= LEAST_COSINE)
+    }
+
+    /// The points of walls that other scans of the time of a scan have seen, and that it looks through.
+    fn passed_in_its_time(&self, number: usize) -> Vec<usize> {
+        let is_of_its_time = |index: &usize| {
+            let scan = self.points[*index].scan;
+            scan != number && !self.are_apart(scan, number)
+        };
+        let mut passed: Vec<usize> = self.beams(number).flat_map(|beam| self.passed(beam)).filter(is_of_its_time).collect();
+        passed.sort_unstable();
+        passed.dedup();
+        passed
+    }
+
+    /// Whether the beams of a scan pass through walls of other times; `None` if too few meet any.
+    fn is_contradicted(&self, number: usize) -> Option<bool> {
+        let (mut passing, mut meeting) = (0, 0);
+        for beam in self.beams(number) {
+            let passes = self.contradicts(number, beam);
+            let is_of_other_time = |index: usize| self.are_apart(self.points[index].scan, number);
+            passing += usize::from(passes);
+            meeting += usize::from(passes || self.index.within(&beam[1], END_REACH).any(is_of_other_time));
+        }
+        (meeting >= LEAST_BEAMS).then_some(passing as f64 > MAX_PASSING * meeting as f64)
+    }
+
+    /// Whether a beam passes through a wall of other times that is recorded, or that two scans have seen and two did not
+    /// look through: what only one has seen may have been a person.
+    fn contradicts(&self, number: usize, beam: [Point2; 2]) -> bool {
         let mut witness = None;
-        for step in 0..steps {
-            let at = lidar + along * (MARGIN + STEP * step as f64);
-            for index in self.index.within(&at, REACH) {
-                let (scan, normal) = &self.seen[index];
-                if !self.are_apart(*scan, number) || normal.dot(&along).abs() < LEAST_COSINE {
-                    continue;
-                }
-                let is_recorded = self.scans[*scan].lidar.is_none();
-                if is_recorded || witness.is_some_and(|witness| witness != *scan) {
-                    return true;
-                }
-                witness = Some(*scan);
+        for index in self.passed(beam) {
+            let WallPoint { scan, passed_in_its_time, .. } = self.points[index];
+            if !self.are_apart(scan, number) || passed_in_its_time >= 2 {
+                continue;
             }
+            let is_recorded = self.scans[scan].lidar.is_none();
+            if is_recorded || witness.is_some_and(|witness| witness != scan) {
+                return true;
+            }
+            witness = Some(scan);
         }
         false
     }
