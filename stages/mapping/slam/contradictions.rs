@@ -95,7 +95,8 @@ impl<'a> Walls<'a> {
             WallPoint { scan, normal, passed_in_its_time: 0 }
         };
         let mut walls = Self { scans, apart, index, points: order.into_iter().map(point).collect() };
-        let passed: Vec<Vec<usize>> = (0..scans.len()).into_par_iter().map(|scan| walls.passed_in_its_time(scan)).collect();
+        let passed: Vec<Vec<usize>> =
+            (0..scans.len()).into_par_iter().map(|scan| walls.passed_in_its_time(scan)).collect();
         for point in passed.into_iter().flatten() {
             walls.points[point].passed_in_its_time += 1;
         }
@@ -132,7 +133,8 @@ impl<'a> Walls<'a> {
             let scan = self.points[*index].scan;
             scan != number && !self.are_apart(scan, number)
         };
-        let mut passed: Vec<usize> = self.beams(number).flat_map(|beam| self.passed(beam)).filter(is_of_its_time).collect();
+        let mut passed: Vec<usize> =
+            self.beams(number).flat_map(|beam| self.passed(beam)).filter(is_of_its_time).collect();
         passed.sort_unstable();
         passed.dedup();
         passed

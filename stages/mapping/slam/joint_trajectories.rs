@@ -123,7 +123,7 @@ impl<'a> JointTrajectories<'a> {
             let recent = own[0].start;
             let revisit =
                 Revisit { graph: &self.graph, scans: &self.scans, submaps: &submaps, drives: &self.drives, recent };
-            find_closures(&revisit, |_| Some(covariance))
+            find_closures(&revisit, &revisit.candidates(|_| Some(covariance)))
         };
         own.par_iter().flat_map_iter(of_submap).collect()
     }

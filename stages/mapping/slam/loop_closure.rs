@@ -5,27 +5,27 @@ use super::local_map::LocalMap;
 use super::pose_graph::{Constraint, PoseGraph, turned_information};
 use super::scan_points::ScanPoint;
 use super::scan_registration::{GAIN, thinned};
+use crate::shared::geometry::Pose2;
 use nalgebra::Matrix3;
-use std::cell::LazyCell;
 use std::ops::Range;
 
 /// Distance of two submaps up to which they may have walls in common, metres, beyond what they are uncertain.
 const COMMON_DISTANCE: f64 = 6.0;
 /// Number of earlier submaps, the nearest ones, in which one is searched: the cost of a submap does not grow with the
 /// time that a robot spends at one place.
-const MAX_SEARCHED: usize = 12;
+pub(super) const MAX_SEARCHED: usize = 12;
 /// Half the window of the search in standard deviations, and its bounds, metres and radians.
-const WINDOW: f64 = 3.0;
-const LEAST_WINDOW: [f64; 2] = [0.3, 0.1];
+pub(super) const WINDOW: f64 = 3.0;
+pub(super) const LEAST_WINDOW: [f64; 2] = [0.3, 0.1];
 const LARGEST_WINDOW: [f64; 2] = [4.0, 0.6];
 /// Number of points that the search looks at.
-const SEARCHED_POINTS: usize = 250;
+pub(super) const SEARCHED_POINTS: usize = 250;
 /// Least mean likelihood of the points at a place that is worth a registration.
-const LEAST_RESPONSE: f64 = 0.35;
+pub(super) const LEAST_RESPONSE: f64 = 0.35;
 /// Largest likelihood of the points at another place, as a share of that at the best.
-const MAX_SECOND: f64 = 0.85;
+pub(super) const MAX_SECOND: f64 = 0.85;
 /// What is another place: distance, metres, and turn, radians.
-const OTHER_PLACE: [f64; 2] = [0.5, 0.15];
+pub(super) const OTHER_PLACE: [f64; 2] = [0.5, 0.15];
 /// Share of the information of a registration that a closure has: the submaps are bent themselves.
 const INFORMATION_SHARE: f64 = 0.3;
 
@@ -52,40 +52,34 @@ pub(super) struct Revisit<'a> {
     pub(super) recent: usize,
 }
 
-/// Looks for the last submap in the earlier ones that may be at its place, by what is known of their relative poses. Each
-/// that fits is the pose of its middle scan in that of the earlier submap.
-pub(super) fn find_loop_closures(revisit: &Revisit<'_>) -> Vec<Constraint> {
-    let Some(own) = revisit.submaps.last() else { return Vec::new() };
-    let covariances = LazyCell::new(|| revisit.graph.covariances_from(middle(own)));
-    find_closures(revisit, |scan| covariances[scan])
+/// An earlier submap that may be where the last one is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate {
+    /// Number of the submap.
+    pub(super) submap: usize,
+    /// Covariance of its pose (x, y, yaw) in the frame of the last submap.
+    pub(super) covariance: Matrix3<f64>,
 }
 
-/// The same, where `covariance` gives that of a scan in the frame of the last submap; none if it is not known.
-pub(super) fn find_closures(
-    revisit: &Revisit<'_>,
-    covariance: impl Fn(usize) -> Option<Matrix3<f64>>,
-) -> Vec<Constraint> {
-    let Some((own, earlier)) = revisit.submaps.split_last() else { return Vec::new() };
-    let centre = middle(own);
-    let poses = &revisit.graph.poses;
-    let distance =
-        |other: &Range<usize>| (poses[middle(other)].translation.vector - poses[centre].translation.vector).norm();
-    let mut candidates: Vec<(f64, usize)> = (0..earlier.len())
-        .filter(|other| earlier[*other].end <= revisit.recent)
-        .map(|other| (distance(&earlier[other]), other))
-        .collect();
-    if candidates.is_empty() {
-        return Vec::new();
+impl Candidate {
+    /// Standard deviations of its position, metres, and of its yaw, radians.
+    pub(super) fn deviations(&self) -> [f64; 2] {
+        [(self.covariance.m11 + self.covariance.m22).sqrt(), self.covariance.m33.sqrt()]
     }
-    candidates.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+}
+
+/// Looks for the last submap in the earlier ones that may be at its place, the nearest first. Each that fits is the pose
+/// of its middle scan in that of the earlier submap.
+pub(super) fn find_closures(revisit: &Revisit<'_>, candidates: &[Candidate]) -> Vec<Constraint> {
+    let Some(own) = revisit.submaps.last() else { return Vec::new() };
+    let centre = middle(own);
     let points = revisit.points_of_submap(own);
-    let may_be_there = |(distance, other): (f64, usize)| {
-        let covariance = covariance(middle(&earlier[other]))?;
-        let deviation = (covariance.m11 + covariance.m22).sqrt();
-        (distance <= COMMON_DISTANCE + 2.0 * deviation).then_some((other, covariance))
+    let find_in = |candidate: &Candidate| {
+        let mean =
+            revisit.graph.poses[middle(&revisit.submaps[candidate.submap])].inv_mul(&revisit.graph.poses[centre]);
+        revisit.find_in(candidate, &mean, centre, &points)
     };
-    let searched = candidates.into_iter().filter_map(may_be_there).take(MAX_SEARCHED);
-    searched.filter_map(|(other, covariance)| revisit.find_in(other, centre, &points, &covariance)).collect()
+    candidates.iter().take(MAX_SEARCHED).filter_map(find_in).collect()
 }
 
 /// The scan in the middle of a submap, whose pose is that of the submap.
@@ -94,13 +88,33 @@ pub(super) fn middle(scans: &Range<usize>) -> usize {
 }
 
 impl Revisit<'_> {
+    /// The earlier submaps that may be where the last one is, the nearest first. `covariance` gives that of a scan in the
+    /// frame of the last submap; none if it is not known.
+    pub(super) fn candidates(&self, covariance: impl Fn(usize) -> Option<Matrix3<f64>>) -> Vec<Candidate> {
+        let Some((own, earlier)) = self.submaps.split_last() else { return Vec::new() };
+        let poses = &self.graph.poses;
+        let distance = |other: &Range<usize>| {
+            (poses[middle(other)].translation.vector - poses[middle(own)].translation.vector).norm()
+        };
+        let mut apart: Vec<(f64, usize)> = (0..earlier.len())
+            .filter(|submap| earlier[*submap].end <= self.recent)
+            .map(|submap| (distance(&earlier[submap]), submap))
+            .collect();
+        apart.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let may_be_there = |(distance, submap): (f64, usize)| {
+            let candidate = Candidate { submap, covariance: covariance(middle(&earlier[submap]))? };
+            (distance <= COMMON_DISTANCE + 2.0 * candidate.deviations()[0]).then_some(candidate)
+        };
+        apart.into_iter().filter_map(may_be_there).collect()
+    }
+
     /// The drive of a scan.
     pub(super) fn drive(&self, scan: usize) -> &Drive {
         &self.drives[self.drives.partition_point(|drive| drive.scans.end <= scan)]
     }
 
     /// Points of a submap in the frame of its middle scan.
-    fn points_of_submap(&self, scans: &Range<usize>) -> Vec<ScanPoint> {
+    pub(super) fn points_of_submap(&self, scans: &Range<usize>) -> Vec<ScanPoint> {
         let into = self.graph.poses[middle(scans)].inverse();
         let of_scan = |scan: usize| {
             let by = into * self.graph.poses[scan];
@@ -139,24 +153,22 @@ impl Revisit<'_> {
         LocalMap::new(scans.iter().map(|scan| (into * poses[*scan], self.scans[*scan])))
     }
 
-    /// Looks for the points of the scan `centre` and those around it in an earlier submap. `covariance` is that of
-    /// the earlier submap in the frame of `centre`.
-    fn find_in(
+    /// Looks for the points of the scan `centre` and those around it in an earlier submap, where its pose is expected to be
+    /// `mean` in that of the submap.
+    pub(super) fn find_in(
         &self,
-        other: usize,
+        candidate: &Candidate,
+        mean: &Pose2,
         centre: usize,
         points: &[ScanPoint],
-        covariance: &Matrix3<f64>,
     ) -> Option<Constraint> {
-        let poses = &self.graph.poses;
-        let at = middle(&self.submaps[other]);
-        let deviations = [(covariance.m11 + covariance.m22).sqrt(), covariance.m33.sqrt()];
-        let map = self.map_of(&self.scans_around(other, self.recent), at);
-        let mean = poses[at].inv_mul(&poses[centre]);
+        let at = middle(&self.submaps[candidate.submap]);
+        let deviations = candidate.deviations();
+        let map = self.map_of(&self.scans_around(candidate.submap, self.recent), at);
         let half = |axis: usize| (WINDOW * deviations[axis]).clamp(LEAST_WINDOW[axis], LARGEST_WINDOW[axis]);
         let window = [half(0), half(0), half(1)];
-        let information = turned_information(&covariance.try_inverse()?, &mean.rotation);
-        let prior = PosePrior { mean, information, window };
+        let information = turned_information(&candidate.covariance.try_inverse()?, &mean.rotation);
+        let prior = PosePrior { mean: *mean, information, window };
         let searched = thinned(points, SEARCHED_POINTS);
         let field = map.field(&searched, &prior);
         let found = search(&field, &searched, &prior, GAIN, LEAST_RESPONSE, None)?;

@@ -23,6 +23,7 @@ mod loop_closure;
 mod odometry_noise;
 mod pose_graph;
 mod recorded_map;
+mod relocalization;
 mod revisits;
 mod scan_points;
 mod scan_registration;

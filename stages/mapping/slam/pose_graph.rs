@@ -75,10 +75,14 @@ impl Constraint {
         residual.dot(&(self.information * residual))
     }
 
-    /// Weight of a measurement with this squared residual: 1 for odometry, and less for loop closures that contradict
-    /// the rest. It is that of Geman and McClure with a scale that is `width` times as wide.
+    /// Weight of a measurement with this squared residual. A loop closure that contradicts the rest is left out: its weight is
+    /// that of Geman and McClure with a scale that is `width` times as wide. The way between two scans yields, as that of
+    /// wheels that slipped, but never breaks: its weight is that of Cauchy.
     fn weight(&self, squared: f64, width: f64) -> f64 {
-        if self.is_loop { (width * ROBUST / (width * ROBUST + squared)).powi(2) } else { 1.0 }
+        match self.is_loop {
+            true => (width * ROBUST / (width * ROBUST + squared)).powi(2),
+            false => ROBUST / (ROBUST + squared),
+        }
     }
 }
 

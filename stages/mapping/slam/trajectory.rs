@@ -2,15 +2,16 @@
 
 use super::contradictions::{Contradictions, PlacedScan, find_contradictions};
 use super::local_map::LocalMap;
-use super::loop_closure::{Drive, Revisit, find_loop_closures};
+use super::loop_closure::{Candidate, Drive, Revisit, find_closures, middle};
 use super::odometry_noise::OdometryNoise;
 use super::pose_graph::{Constraint, LandmarkSighting, PoseGraph, turned_information};
+use super::relocalization::{Relocalization, is_uncertain};
 use super::revisits::refine;
 use super::scan_points::ScanPoint;
 use super::scan_registration::{WELL_MATCHED, register};
 use crate::shared::geometry::{Point2, Pose2};
 use nalgebra::{Matrix3, UnitComplex, Vector2, Vector3};
-use std::cell::OnceCell;
+use std::cell::{LazyCell, OnceCell};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::slice;
@@ -70,6 +71,8 @@ pub struct Trajectory {
     submap_start: usize,
     /// Earlier submaps that are part of the local map.
     revisited: Vec<usize>,
+    /// Where the last submap was found, if its pose was uncertain.
+    relocalized: Option<Relocalization>,
     is_recorded: bool,
     /// The tags that were seen.
     tags: BTreeMap<String, SeenTag>,
@@ -90,6 +93,7 @@ impl Trajectory {
             submaps: Vec::new(),
             submap_start: 0,
             revisited: Vec::new(),
+            relocalized: None,
             is_recorded: false,
             tags: BTreeMap::new(),
             local_map: OnceCell::new(),
@@ -320,7 +324,8 @@ impl Trajectory {
         let (drive, scans) = (self.drive(), self.scans().collect::<Vec<_>>());
         let drives = slice::from_ref(&drive);
         let revisit = Revisit { graph: &self.graph, scans: &scans, submaps: &self.submaps, drives, recent };
-        let found = find_loop_closures(&revisit);
+        let (found, relocalized) = self.loop_closures(&revisit);
+        self.relocalized = relocalized;
         let has_closed = !found.is_empty();
         self.graph.constraints.extend(found);
         if has_closed {
@@ -329,6 +334,26 @@ impl Trajectory {
         self.revisited = self.tied_submaps(recent);
         self.local_map.take();
         has_closed || has_seen_again
+    }
+
+    /// The loop closures of the last submap; and where it was found among all before, which the next one has to agree with.
+    fn loop_closures(&self, revisit: &Revisit<'_>) -> (Vec<Constraint>, Option<Relocalization>) {
+        let Some(own) = revisit.submaps.last() else { return (Vec::new(), None) };
+        let covariances = LazyCell::new(|| self.graph.covariances_from(middle(own)));
+        let candidates = revisit.candidates(|scan| covariances[scan]);
+        let (uncertain, certain): (Vec<Candidate>, Vec<Candidate>) = candidates.into_iter().partition(is_uncertain);
+        let closures = find_closures(revisit, &certain);
+        if !closures.is_empty() {
+            return (closures, None);
+        }
+        let found = Relocalization::find(revisit, &uncertain);
+        match (&self.relocalized, found) {
+            (Some(before), Some(found)) if before.agrees(&found, &self.graph.poses) => {
+                let before = before.clone().into_closures();
+                (before.into_iter().chain(found.into_closures()).collect(), None)
+            }
+            (_, found) => (Vec::new(), found),
+        }
     }
 
     /// Finishes the last submap, and registers each scan on what was seen at its place at other times. Returns whether
