@@ -6,7 +6,7 @@
 //! pose graphs for robust cooperative mapping"; as in Cartographer, all trajectories are nodes of one graph).
 
 use super::contradictions::{Contradictions, find_contradictions};
-use super::loop_closure::{Drive, Revisit, find_closures};
+use super::loop_closure::{Drive, Revisit, find_closures, middle};
 use super::pose_graph::{Constraint, LandmarkSighting, PoseGraph};
 use super::revisits::refine;
 use super::scan_points::ScanPoint;
@@ -123,7 +123,8 @@ impl<'a> JointTrajectories<'a> {
             let recent = own[0].start;
             let revisit =
                 Revisit { graph: &self.graph, scans: &self.scans, submaps: &submaps, drives: &self.drives, recent };
-            find_closures(&revisit, &revisit.candidates(|_| Some(covariance)))
+            let pose = self.graph.poses[middle(submap)];
+            find_closures(&revisit, &pose, &revisit.candidates(|_| Some(covariance)))
         };
         own.par_iter().flat_map_iter(of_submap).collect()
     }

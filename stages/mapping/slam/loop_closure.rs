@@ -13,17 +13,17 @@ use std::ops::Range;
 const COMMON_DISTANCE: f64 = 6.0;
 /// Number of earlier submaps, the nearest ones, in which one is searched: the cost of a submap does not grow with the
 /// time that a robot spends at one place.
-pub(super) const MAX_SEARCHED: usize = 12;
+const MAX_SEARCHED: usize = 12;
 /// Half the window of the search in standard deviations, and its bounds, metres and radians.
 pub(super) const WINDOW: f64 = 3.0;
 pub(super) const LEAST_WINDOW: [f64; 2] = [0.3, 0.1];
 const LARGEST_WINDOW: [f64; 2] = [4.0, 0.6];
 /// Number of points that the search looks at.
-pub(super) const SEARCHED_POINTS: usize = 250;
+const SEARCHED_POINTS: usize = 250;
 /// Least mean likelihood of the points at a place that is worth a registration.
-pub(super) const LEAST_RESPONSE: f64 = 0.35;
+const LEAST_RESPONSE: f64 = 0.35;
 /// Largest likelihood of the points at another place, as a share of that at the best.
-pub(super) const MAX_SECOND: f64 = 0.85;
+const MAX_SECOND: f64 = 0.85;
 /// What is another place: distance, metres, and turn, radians.
 pub(super) const OTHER_PLACE: [f64; 2] = [0.5, 0.15];
 /// Share of the information of a registration that a closure has: the submaps are bent themselves.
@@ -68,15 +68,14 @@ impl Candidate {
     }
 }
 
-/// Looks for the last submap in the earlier ones that may be at its place, the nearest first. Each that fits is the pose
-/// of its middle scan in that of the earlier submap.
-pub(super) fn find_closures(revisit: &Revisit<'_>, candidates: &[Candidate]) -> Vec<Constraint> {
+/// Looks for the last submap, whose middle scan is expected to be at `pose`, in the first of the candidates. Each in which it
+/// fits gives the pose of that scan in the earlier submap.
+pub(super) fn find_closures(revisit: &Revisit<'_>, pose: &Pose2, candidates: &[Candidate]) -> Vec<Constraint> {
     let Some(own) = revisit.submaps.last() else { return Vec::new() };
     let centre = middle(own);
-    let points = revisit.points_of_submap(own);
+    let points = revisit.points_of(own.clone(), centre);
     let find_in = |candidate: &Candidate| {
-        let mean =
-            revisit.graph.poses[middle(&revisit.submaps[candidate.submap])].inv_mul(&revisit.graph.poses[centre]);
+        let mean = revisit.pose_of(candidate.submap).inv_mul(pose);
         revisit.find_in(candidate, &mean, centre, &points)
     };
     candidates.iter().take(MAX_SEARCHED).filter_map(find_in).collect()
@@ -108,14 +107,19 @@ impl Revisit<'_> {
         apart.into_iter().filter_map(may_be_there).collect()
     }
 
+    /// The pose of a submap: that of its middle scan.
+    pub(super) fn pose_of(&self, submap: usize) -> Pose2 {
+        self.graph.poses[middle(&self.submaps[submap])]
+    }
+
     /// The drive of a scan.
     pub(super) fn drive(&self, scan: usize) -> &Drive {
         &self.drives[self.drives.partition_point(|drive| drive.scans.end <= scan)]
     }
 
-    /// Points of a submap in the frame of its middle scan.
-    pub(super) fn points_of_submap(&self, scans: &Range<usize>) -> Vec<ScanPoint> {
-        let into = self.graph.poses[middle(scans)].inverse();
+    /// Points of scans in the frame of one of them.
+    pub(super) fn points_of(&self, scans: Range<usize>, frame: usize) -> Vec<ScanPoint> {
+        let into = self.graph.poses[frame].inverse();
         let of_scan = |scan: usize| {
             let by = into * self.graph.poses[scan];
             let moved = move |point: &ScanPoint| ScanPoint {
@@ -124,7 +128,7 @@ impl Revisit<'_> {
             };
             self.scans[scan].iter().map(moved)
         };
-        scans.clone().flat_map(of_scan).collect()
+        scans.flat_map(of_scan).collect()
     }
 
     /// The scans before `until` of a submap and of those before and after it on the same drive, as a later one need not
@@ -155,13 +159,7 @@ impl Revisit<'_> {
 
     /// Looks for the points of the scan `centre` and those around it in an earlier submap, where its pose is expected to be
     /// `mean` in that of the submap.
-    pub(super) fn find_in(
-        &self,
-        candidate: &Candidate,
-        mean: &Pose2,
-        centre: usize,
-        points: &[ScanPoint],
-    ) -> Option<Constraint> {
+    fn find_in(&self, candidate: &Candidate, mean: &Pose2, centre: usize, points: &[ScanPoint]) -> Option<Constraint> {
         let at = middle(&self.submaps[candidate.submap]);
         let deviations = candidate.deviations();
         let map = self.map_of(&self.scans_around(candidate.submap, self.recent), at);

@@ -1,14 +1,13 @@
 //! Relocalization: where a robot is, in all that it saw before, when its pose is too uncertain for one place.
 //!
-//! After a long way the deviations of a pose are wider than the distance of two doors. A submap then fits at several places
-//! that look alike, and what the search of one of them finds says nothing of the others. It is searched in all at once,
-//! and where it fits at one place alone, and the next submap fits there, too, the robot has been there before.
+//! After a long way a pose is less certain than two doors of a corridor are apart. Where a robot then fits into one submap
+//! it may fit into others as well, which the search of one alone does not see. So the scans of its last metres are searched in
+//! all submaps at once, within all that is uncertain. Where they fit at one place alone, and those after the next submap
+//! fit there, too, the robot has been there before.
 
 use super::correlative_search::{Excluded, PosePrior, search};
 use super::likelihood_field::LikelihoodField;
-use super::loop_closure::{
-    Candidate, LEAST_WINDOW, MAX_SEARCHED, OTHER_PLACE, Revisit, SEARCHED_POINTS, WINDOW, middle,
-};
+use super::loop_closure::{Candidate, LEAST_WINDOW, OTHER_PLACE, Revisit, WINDOW, find_closures, middle};
 use super::pose_graph::{Constraint, turned_information};
 use super::scan_registration::{GAIN, thinned};
 use crate::shared::geometry::Pose2;
@@ -23,7 +22,9 @@ const LEAST_RESPONSE: f64 = 0.5;
 const LEAST_LEAD: f64 = 7.0;
 /// Largest half of the window, metres: a robot that may be farther off is not searched for.
 const LARGEST_WINDOW: f64 = 60.0;
-/// Farthest points from the middle of the submap that are searched for, metres.
+/// Number of points that are searched for.
+const SEARCHED_POINTS: usize = 750;
+/// Distance of the farthest of them from the middle of the submap, metres.
 const FARTHEST: f64 = 20.0;
 
 /// A submap that was found among those before.
@@ -42,12 +43,12 @@ pub(super) fn is_uncertain(candidate: &Candidate) -> bool {
 }
 
 impl Relocalization {
-    /// Looks for the last submap in all of the candidates. `None` if it fits nowhere, or at several places.
+    /// Looks for the last scans in all of the candidates. `None` if they fit nowhere, or at several places.
     pub(super) fn find(revisit: &Revisit<'_>, candidates: &[Candidate]) -> Option<Self> {
         let scan = middle(revisit.submaps.last()?);
-        let points = revisit.points_of_submap(revisit.submaps.last()?);
-        let searched: Vec<_> = points.iter().filter(|point| point.place.coords.norm() < FARTHEST).copied().collect();
-        let searched = thinned(&searched, SEARCHED_POINTS);
+        let mut points = revisit.points_of(revisit.recent..revisit.submaps.last()?.end, scan);
+        points.retain(|point| point.place.coords.norm() < FARTHEST);
+        let searched = thinned(&points, SEARCHED_POINTS);
         let poses = &revisit.graph.poses;
         let least_known = candidates.iter().max_by(|a, b| a.deviations()[0].total_cmp(&b.deviations()[0]))?;
         let information = turned_information(&least_known.covariance.try_inverse()?, &poses[scan].rotation);
@@ -87,20 +88,86 @@ impl Relocalization {
     }
 }
 
-/// The last submap, which is at a pose, in the nearest of the candidates there.
+/// Ties the last submap, which is at a pose, to the nearest of the candidates there.
 fn closures_at(revisit: &Revisit<'_>, pose: &Pose2, candidates: &[Candidate]) -> Vec<Constraint> {
-    let Some(own) = revisit.submaps.last() else { return Vec::new() };
-    let poses = &revisit.graph.poses;
-    let points = revisit.points_of_submap(own);
-    let place_of = |submap: usize| poses[middle(&revisit.submaps[submap])];
-    let distance = |submap: usize| (place_of(submap).translation.vector - pose.translation.vector).norm();
-    let mut near: Vec<(f64, usize)> = candidates.iter().map(|other| (distance(other.submap), other.submap)).collect();
-    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let [place, yaw] = LEAST_WINDOW.map(|window| (window / WINDOW).powi(2));
     let covariance = Matrix3::from_diagonal(&Vector3::new(0.5 * place, 0.5 * place, yaw));
-    let find_in = |(_, submap): (f64, usize)| {
-        let mean = place_of(submap).inv_mul(pose);
-        revisit.find_in(&Candidate { submap, covariance }, &mean, middle(own), &points)
-    };
-    near.into_iter().take(MAX_SEARCHED).filter_map(find_in).collect()
+    let distance = |submap: usize| (revisit.pose_of(submap).translation.vector - pose.translation.vector).norm();
+    let mut near: Vec<(f64, usize)> = candidates.iter().map(|other| (distance(other.submap), other.submap)).collect();
+    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let near: Vec<Candidate> = near.into_iter().map(|(_, submap)| Candidate { submap, covariance }).collect();
+    find_closures(revisit, pose, &near)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mapping::slam::loop_closure::Drive;
+    use crate::mapping::slam::pose_graph::PoseGraph;
+    use crate::mapping::slam::scan_points::ScanPoint;
+    use crate::shared::geometry::{Point2, pose};
+    use nalgebra::Vector2;
+    use std::ops::Range;
+
+    const SUBMAP: usize = 10;
+
+    /// A corridor 60 m long with a pillar on both sides each 4 m, and a cupboard at `x`.
+    fn corridor(x: f64) -> Vec<ScanPoint> {
+        let wall = |from: [f64; 2], to: [f64; 2], normal: [f64; 2]| {
+            let (from, to) = (Vector2::from(from), Vector2::from(to));
+            let steps = ((to - from).norm() / 0.05).round() as usize;
+            (0..=steps).map(move |step| ScanPoint {
+                place: Point2::from(from + (to - from) * (step as f64 / steps as f64)),
+                normal: Some(Vector2::from(normal)),
+            })
+        };
+        let pillars = (0..15).map(|number| 4.0 * f64::from(number) + 1.0).flat_map(|x| {
+            let low = wall([x, 0.0], [x, 0.5], [-1.0, 0.0]).chain(wall([x + 0.5, 0.0], [x + 0.5, 0.5], [1.0, 0.0]));
+            low.chain(wall([x, 2.5], [x, 3.0], [-1.0, 0.0])).chain(wall([x + 0.5, 2.5], [x + 0.5, 3.0], [1.0, 0.0]))
+        });
+        let sides = wall([0.0, 0.0], [60.0, 0.0], [0.0, 1.0]).chain(wall([0.0, 3.0], [60.0, 3.0], [0.0, -1.0]));
+        let cupboard = wall([x, 1.6], [x, 3.0], [-1.0, 0.0]).chain(wall([x, 1.6], [x + 3.0, 1.6], [0.0, -1.0]));
+        sides.chain(pillars).chain(cupboard).collect()
+    }
+
+    /// What is found of a robot that has gone along the corridor, and comes back to a place in it after a way on which its
+    /// pose has become wrong by `off` metres along it, with a standard deviation of 2 m.
+    fn found(walls: &[ScanPoint], place: f64, off: f64) -> Option<Pose2> {
+        let at = |step: usize| pose(0.4 * step as f64, 1.5, 0.0);
+        let again = |step: usize| pose(place + 0.4 * step as f64, 1.5, 0.0);
+        let truth: Vec<Pose2> = (0..150).map(at).chain((0..SUBMAP).map(again)).collect();
+        let seen = |truth: &Pose2| -> Vec<ScanPoint> {
+            let near = walls.iter().filter(|point| (point.place - truth.translation.vector).coords.norm() < 6.0);
+            near.map(|point| ScanPoint { place: truth.inverse() * point.place, ..*point }).collect()
+        };
+        let scans: Vec<Vec<ScanPoint>> = truth.iter().map(seen).collect();
+        let scans: Vec<&[ScanPoint]> = scans.iter().map(Vec::as_slice).collect();
+        let mut graph = PoseGraph { poses: truth, ..Default::default() };
+        graph.poses[150..].iter_mut().for_each(|pose| pose.translation.x += off);
+        let submaps: Vec<Range<usize>> = (0..16).map(|submap| SUBMAP * submap..SUBMAP * (submap + 1)).collect();
+        let drives = [Drive { scans: 0..160, is_recorded: false }];
+        let revisit = Revisit { graph: &graph, scans: &scans, submaps: &submaps, drives: &drives, recent: 150 };
+        let covariance = Matrix3::from_diagonal(&Vector3::new(4.0, 0.04, 0.01));
+        let candidates = revisit.candidates(|_| Some(covariance));
+        assert!(candidates.iter().all(is_uncertain));
+        Some(Relocalization::find(&revisit, &candidates)?.pose)
+    }
+
+    #[test]
+    fn a_corridor_that_looks_alike_all_along_is_known_again_only_where_something_stands() {
+        let walls = corridor(33.5);
+        // The place nearest to where it seems to be that fits but for the cupboard is one pillar away.
+        let at = found(&walls, 30.0, 3.6).unwrap();
+        let truth = 30.0 + 0.4 * 5.0;
+        assert!((at.translation.x - truth).abs() < 0.1 && (at.translation.y - 1.5).abs() < 0.1, "{at}");
+        assert_eq!(found(&walls, 12.0, 3.6), None);
+    }
+
+    #[test]
+    fn one_that_was_found_agrees_with_the_next_only_if_that_is_as_far_on() {
+        let poses = [pose(0.0, 0.0, 0.0), pose(4.0, 0.0, 0.0)];
+        let found = |scan: usize, x: f64| Relocalization { scan, pose: pose(x, 7.0, 0.0), closures: Vec::new() };
+        assert!(found(0, 20.0).agrees(&found(1, 24.2), &poses));
+        assert!(!found(0, 20.0).agrees(&found(1, 28.0), &poses));
+    }
 }

@@ -39,10 +39,22 @@ fn range(walls: &[[Point2; 2]], from: &Pose2, angle: f64) -> f64 {
 }
 
 fn scan(walls: &[[Point2; 2]], at: &Pose2, random: &mut ChaCha8Rng) -> Vec<ScanPoint> {
+    scan_through(walls, &[], at, random)
+}
+
+/// A scan of walls, and of railings through which every second beam passes.
+fn scan_through(
+    walls: &[[Point2; 2]],
+    railings: &[[Point2; 2]],
+    at: &Pose2,
+    random: &mut ChaCha8Rng,
+) -> Vec<ScanPoint> {
     let hit = |beam: usize| {
         let angle = TAU * beam as f64 / BEAMS as f64;
         let noise: f64 = (0..12).map(|_| random.random_range(-0.5..0.5)).sum();
-        let range = range(walls, at, angle) + NOISE * noise;
+        let passes = railings.is_empty() || random.random_bool(0.5);
+        let to_railing = if passes { f64::INFINITY } else { range(railings, at, angle) };
+        let range = range(walls, at, angle).min(to_railing) + NOISE * noise;
         Point2::new(range * angle.cos(), range * angle.sin())
     };
     let hits: Vec<Point2> = (0..BEAMS).map(hit).collect();
@@ -169,6 +181,20 @@ fn scans_contradict_walls_that_were_drawn_elsewhere() {
     let alone = scans.iter().zip(&truth).take(30);
     let alone = alone.map(|(points, pose)| PlacedScan { points, pose: *pose, lidar: Some(Point2::origin()), drive: 0 });
     assert_eq!(find_contradictions(&alone.collect::<Vec<_>>(), 40).revisiting, 0);
+}
+
+#[test]
+fn scans_do_not_contradict_a_railing_that_was_looked_through_whenever_it_was_seen() {
+    let (walls, truth) = (walls(), drive());
+    // Along the first corridor, in front of the block, on both ways there.
+    let railing = [[Point2::new(2.0, 2.3), Point2::new(20.0, 2.3)]];
+    let mut random = ChaCha8Rng::seed_from_u64(9);
+    let scans: Vec<_> = truth.iter().map(|at| scan_through(&walls, &railing, at, &mut random)).collect();
+    let placed = scans.iter().zip(&truth);
+    let placed =
+        placed.map(|(points, pose)| PlacedScan { points, pose: *pose, lidar: Some(Point2::origin()), drive: 0 });
+    let found = find_contradictions(&placed.collect::<Vec<_>>(), 40);
+    assert!(found.revisiting > 60 && found.contradicting.is_empty(), "{found:?}");
 }
 
 /// The trajectory of a robot with a lidar of some metres, whose odometry goes too far and turns too far along the poses.

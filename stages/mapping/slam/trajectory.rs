@@ -342,7 +342,7 @@ impl Trajectory {
         let covariances = LazyCell::new(|| self.graph.covariances_from(middle(own)));
         let candidates = revisit.candidates(|scan| covariances[scan]);
         let (uncertain, certain): (Vec<Candidate>, Vec<Candidate>) = candidates.into_iter().partition(is_uncertain);
-        let closures = find_closures(revisit, &certain);
+        let closures = find_closures(revisit, &self.graph.poses[middle(own)], &certain);
         if !closures.is_empty() {
             return (closures, None);
         }
