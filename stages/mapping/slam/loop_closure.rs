@@ -52,6 +52,9 @@ pub(super) struct Revisit<'a> {
     pub(super) recent: usize,
 }
 
+/// Standard deviation of a position, metres, above which a place is searched in all that may be there.
+const UNCERTAIN: f64 = 0.5;
+
 /// An earlier submap that may be where the last one is.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Candidate {
@@ -62,6 +65,11 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
+    /// Whether it may be so far off that a place is searched in all that may be there.
+    pub(super) fn is_uncertain(&self) -> bool {
+        self.deviations()[0] > UNCERTAIN
+    }
+
     /// Standard deviations of its position, metres, and of its yaw, radians.
     pub(super) fn deviations(&self) -> [f64; 2] {
         [(self.covariance.m11 + self.covariance.m22).sqrt(), self.covariance.m33.sqrt()]

@@ -14,10 +14,8 @@ use crate::shared::geometry::Pose2;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
 
-/// Standard deviation of a position, metres, above which a place is searched in all that may be there.
-const UNCERTAIN: f64 = 0.5;
 /// Least mean likelihood of the points at a place where the robot may be: much that was not seen looks alike.
-const LEAST_RESPONSE: f64 = 0.5;
+const LEAST_RESPONSE: f64 = 0.7;
 /// Logarithm of how much likelier than any other a place must be.
 const LEAST_LEAD: f64 = 7.0;
 /// Largest half of the window, metres: a robot that may be farther off is not searched for.
@@ -35,11 +33,6 @@ pub(super) struct Relocalization {
     pose: Pose2,
     /// What it is tied to there.
     closures: Vec<Constraint>,
-}
-
-/// Whether a submap may be so far off that it has to be searched in all that may be there.
-pub(super) fn is_uncertain(candidate: &Candidate) -> bool {
-    candidate.deviations()[0] > UNCERTAIN
 }
 
 impl Relocalization {
@@ -149,7 +142,7 @@ mod tests {
         let revisit = Revisit { graph: &graph, scans: &scans, submaps: &submaps, drives: &drives, recent: 150 };
         let covariance = Matrix3::from_diagonal(&Vector3::new(4.0, 0.04, 0.01));
         let candidates = revisit.candidates(|_| Some(covariance));
-        assert!(candidates.iter().all(is_uncertain));
+        assert!(candidates.iter().all(Candidate::is_uncertain));
         Some(Relocalization::find(&revisit, &candidates)?.pose)
     }
 

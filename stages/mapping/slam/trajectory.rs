@@ -5,7 +5,7 @@ use super::local_map::LocalMap;
 use super::loop_closure::{Candidate, Drive, Revisit, find_closures, middle};
 use super::odometry_noise::OdometryNoise;
 use super::pose_graph::{Constraint, LandmarkSighting, PoseGraph, turned_information};
-use super::relocalization::{Relocalization, is_uncertain};
+use super::relocalization::Relocalization;
 use super::revisits::refine;
 use super::scan_points::ScanPoint;
 use super::scan_registration::{WELL_MATCHED, register};
@@ -341,12 +341,13 @@ impl Trajectory {
         let Some(own) = revisit.submaps.last() else { return (Vec::new(), None) };
         let covariances = LazyCell::new(|| self.graph.covariances_from(middle(own)));
         let candidates = revisit.candidates(|scan| covariances[scan]);
-        let (uncertain, certain): (Vec<Candidate>, Vec<Candidate>) = candidates.into_iter().partition(is_uncertain);
+        let certain: Vec<Candidate> =
+            candidates.iter().filter(|candidate| !candidate.is_uncertain()).copied().collect();
         let closures = find_closures(revisit, &self.graph.poses[middle(own)], &certain);
-        if !closures.is_empty() {
+        if !closures.is_empty() || certain.len() == candidates.len() {
             return (closures, None);
         }
-        let found = Relocalization::find(revisit, &uncertain);
+        let found = Relocalization::find(revisit, &candidates);
         match (&self.relocalized, found) {
             (Some(before), Some(found)) if before.agrees(&found, &self.graph.poses) => {
                 let before = before.clone().into_closures();
