@@ -2,8 +2,7 @@
 //!
 //! After a long way a pose is less certain than two doors of a corridor are apart. Where a robot then fits into one submap
 //! it may fit into others as well, which the search of one alone does not see. So the scans of its last metres are searched in
-//! all submaps at once, within all that is uncertain. Where they fit at one place alone, and those after the next submap
-//! fit there, too, the robot has been there before.
+//! all submaps at once, within all that is uncertain. Where most of them fit at one place alone, the robot has been there.
 
 use super::correlative_search::{Excluded, PosePrior, search};
 use super::likelihood_field::LikelihoodField;
@@ -25,60 +24,44 @@ const SEARCHED_POINTS: usize = 750;
 /// Distance of the farthest of them from the middle of the submap, metres.
 const FARTHEST: f64 = 20.0;
 
-/// A submap that was found among those before.
-#[derive(Clone, Debug)]
-pub(super) struct Relocalization {
-    /// Its middle scan, and the pose of that.
-    scan: usize,
-    pose: Pose2,
-    /// What it is tied to there.
-    closures: Vec<Constraint>,
+/// Ties the last submap to those of the candidates where the scans of its last metres are found. Nothing if they fit nowhere,
+/// or at several places.
+pub(super) fn relocalize(revisit: &Revisit<'_>, candidates: &[Candidate]) -> Vec<Constraint> {
+    match find_place(revisit, candidates) {
+        Some(pose) => closures_at(revisit, &pose, candidates),
+        None => Vec::new(),
+    }
 }
 
-impl Relocalization {
-    /// Looks for the last scans in all of the candidates. `None` if they fit nowhere, or at several places.
-    pub(super) fn find(revisit: &Revisit<'_>, candidates: &[Candidate]) -> Option<Self> {
-        let scan = middle(revisit.submaps.last()?);
-        let mut points = revisit.points_of(revisit.recent..revisit.submaps.last()?.end, scan);
-        points.retain(|point| point.place.coords.norm() < FARTHEST);
-        let searched = thinned(&points, SEARCHED_POINTS);
-        let poses = &revisit.graph.poses;
-        let least_known = candidates.iter().max_by(|a, b| a.deviations()[0].total_cmp(&b.deviations()[0]))?;
-        let information = turned_information(&least_known.covariance.try_inverse()?, &poses[scan].rotation);
-        let covariance = information.try_inverse()?;
-        let [x, y, yaw] = [0, 1, 2].map(|axis| WINDOW * covariance[(axis, axis)].sqrt());
-        // Written so that a value that is not a number fails it.
-        if !(x <= LARGEST_WINDOW && y <= LARGEST_WINDOW) {
-            return None;
-        }
-        let window = [x, y, yaw.min(PI)];
-        let prior = PosePrior { mean: poses[scan], information, window };
-        let scans = candidates.iter().flat_map(|candidate| revisit.submaps[candidate.submap].clone());
-        let walls = scans.flat_map(|scan| revisit.scans[scan].iter().map(move |point| poses[scan] * point.place));
-        let field = LikelihoodField::new(walls, &prior.reach(&searched), x.max(y));
-        let found = search(&field, &searched, &prior, GAIN, LEAST_RESPONSE, None)?;
-        let excluded = Excluded { pose: found.pose, distance: OTHER_PLACE[0], turn: OTHER_PLACE[1] };
-        // What has fewer points on walls is less likely whatever the prior says.
-        let least = (found.score - LEAST_LEAD) / (GAIN * searched.len() as f64);
-        let other = search(&field, &searched, &prior, GAIN, least, Some(&excluded));
-        if other.is_some_and(|other| other.score > found.score - LEAST_LEAD) {
-            return None;
-        }
-        let closures = closures_at(revisit, &found.pose, candidates);
-        (!closures.is_empty()).then_some(Self { scan, pose: found.pose, closures })
+/// The pose of the last submap.
+fn find_place(revisit: &Revisit<'_>, candidates: &[Candidate]) -> Option<Pose2> {
+    let scan = middle(revisit.submaps.last()?);
+    let mut points = revisit.points_of(revisit.recent..revisit.submaps.last()?.end, scan);
+    points.retain(|point| point.place.coords.norm() < FARTHEST);
+    let searched = thinned(&points, SEARCHED_POINTS);
+    let poses = &revisit.graph.poses;
+    let least_known = candidates.iter().max_by(|a, b| a.deviations()[0].total_cmp(&b.deviations()[0]))?;
+    let information = turned_information(&least_known.covariance.try_inverse()?, &poses[scan].rotation);
+    let covariance = information.try_inverse()?;
+    let [x, y, yaw] = [0, 1, 2].map(|axis| WINDOW * covariance[(axis, axis)].sqrt());
+    // Written so that a value that is not a number fails it.
+    if !(x <= LARGEST_WINDOW && y <= LARGEST_WINDOW) {
+        return None;
     }
-
-    /// Whether the next submap was found where this one and the way between both say.
-    pub(super) fn agrees(&self, next: &Self, poses: &[Pose2]) -> bool {
-        let expected = self.pose * poses[self.scan].inv_mul(&poses[next.scan]);
-        let off = expected.inv_mul(&next.pose);
-        off.translation.vector.norm() < OTHER_PLACE[0] && off.rotation.angle().abs() < OTHER_PLACE[1]
+    let window = [x, y, yaw.min(PI)];
+    let prior = PosePrior { mean: poses[scan], information, window };
+    let scans = candidates.iter().flat_map(|candidate| revisit.submaps[candidate.submap].clone());
+    let walls = scans.flat_map(|scan| revisit.scans[scan].iter().map(move |point| poses[scan] * point.place));
+    let field = LikelihoodField::new(walls, &prior.reach(&searched), x.max(y));
+    let found = search(&field, &searched, &prior, GAIN, LEAST_RESPONSE, None)?;
+    let excluded = Excluded { pose: found.pose, distance: OTHER_PLACE[0], turn: OTHER_PLACE[1] };
+    // What has fewer points on walls is less likely whatever the prior says.
+    let least = (found.score - LEAST_LEAD) / (GAIN * searched.len() as f64);
+    let other = search(&field, &searched, &prior, GAIN, least, Some(&excluded));
+    if other.is_some_and(|other| other.score > found.score - LEAST_LEAD) {
+        return None;
     }
-
-    /// What the submap is tied to.
-    pub(super) fn into_closures(self) -> Vec<Constraint> {
-        self.closures
-    }
+    Some(found.pose)
 }
 
 /// Ties the last submap, which is at a pose, to the nearest of the candidates there.
@@ -143,7 +126,7 @@ mod tests {
         let covariance = Matrix3::from_diagonal(&Vector3::new(4.0, 0.04, 0.01));
         let candidates = revisit.candidates(|_| Some(covariance));
         assert!(candidates.iter().all(Candidate::is_uncertain));
-        Some(Relocalization::find(&revisit, &candidates)?.pose)
+        find_place(&revisit, &candidates)
     }
 
     #[test]
@@ -154,13 +137,5 @@ mod tests {
         let truth = 30.0 + 0.4 * 5.0;
         assert!((at.translation.x - truth).abs() < 0.1 && (at.translation.y - 1.5).abs() < 0.1, "{at}");
         assert_eq!(found(&walls, 12.0, 3.6), None);
-    }
-
-    #[test]
-    fn one_that_was_found_agrees_with_the_next_only_if_that_is_as_far_on() {
-        let poses = [pose(0.0, 0.0, 0.0), pose(4.0, 0.0, 0.0)];
-        let found = |scan: usize, x: f64| Relocalization { scan, pose: pose(x, 7.0, 0.0), closures: Vec::new() };
-        assert!(found(0, 20.0).agrees(&found(1, 24.2), &poses));
-        assert!(!found(0, 20.0).agrees(&found(1, 28.0), &poses));
     }
 }

@@ -5,7 +5,7 @@ use super::local_map::LocalMap;
 use super::loop_closure::{Candidate, Drive, Revisit, find_closures, middle};
 use super::odometry_noise::OdometryNoise;
 use super::pose_graph::{Constraint, LandmarkSighting, PoseGraph, turned_information};
-use super::relocalization::Relocalization;
+use super::relocalization::relocalize;
 use super::revisits::refine;
 use super::scan_points::ScanPoint;
 use super::scan_registration::{WELL_MATCHED, register};
@@ -71,8 +71,6 @@ pub struct Trajectory {
     submap_start: usize,
     /// Earlier submaps that are part of the local map.
     revisited: Vec<usize>,
-    /// Where the last submap was found, if its pose was uncertain.
-    relocalized: Option<Relocalization>,
     is_recorded: bool,
     /// The tags that were seen.
     tags: BTreeMap<String, SeenTag>,
@@ -93,7 +91,6 @@ impl Trajectory {
             submaps: Vec::new(),
             submap_start: 0,
             revisited: Vec::new(),
-            relocalized: None,
             is_recorded: false,
             tags: BTreeMap::new(),
             local_map: OnceCell::new(),
@@ -324,8 +321,7 @@ impl Trajectory {
         let (drive, scans) = (self.drive(), self.scans().collect::<Vec<_>>());
         let drives = slice::from_ref(&drive);
         let revisit = Revisit { graph: &self.graph, scans: &scans, submaps: &self.submaps, drives, recent };
-        let (found, relocalized) = self.loop_closures(&revisit);
-        self.relocalized = relocalized;
+        let found = self.loop_closures(&revisit);
         let has_closed = !found.is_empty();
         self.graph.constraints.extend(found);
         if has_closed {
@@ -336,24 +332,17 @@ impl Trajectory {
         has_closed || has_seen_again
     }
 
-    /// The loop closures of the last submap; and where it was found among all before, which the next one has to agree with.
-    fn loop_closures(&self, revisit: &Revisit<'_>) -> (Vec<Constraint>, Option<Relocalization>) {
-        let Some(own) = revisit.submaps.last() else { return (Vec::new(), None) };
+    /// The loop closures of the last submap.
+    fn loop_closures(&self, revisit: &Revisit<'_>) -> Vec<Constraint> {
+        let Some(own) = revisit.submaps.last() else { return Vec::new() };
         let covariances = LazyCell::new(|| self.graph.covariances_from(middle(own)));
         let candidates = revisit.candidates(|scan| covariances[scan]);
         let certain: Vec<Candidate> =
             candidates.iter().filter(|candidate| !candidate.is_uncertain()).copied().collect();
         let closures = find_closures(revisit, &self.graph.poses[middle(own)], &certain);
-        if !closures.is_empty() || certain.len() == candidates.len() {
-            return (closures, None);
-        }
-        let found = Relocalization::find(revisit, &candidates);
-        match (&self.relocalized, found) {
-            (Some(before), Some(found)) if before.agrees(&found, &self.graph.poses) => {
-                let before = before.clone().into_closures();
-                (before.into_iter().chain(found.into_closures()).collect(), None)
-            }
-            (_, found) => (Vec::new(), found),
+        match closures.is_empty() && certain.len() < candidates.len() {
+            true => relocalize(revisit, &candidates),
+            false => closures,
         }
     }
 
