@@ -123,7 +123,7 @@ impl<'a> Walls<'a> {
         let along = way / range;
         let steps = ((range - 2.0 * MARGIN) / STEP).max(0.0) as usize;
         let places = (0..steps).map(move |step| lidar + along * (MARGIN + STEP * step as f64));
-        let points = places.flat_map(|at| self.index.within(&at, REACH).collect::<Vec<_>>());
+        let points = places.flat_map(|at| self.index.within(&at, REACH));
         points.filter(move |index| self.points[*index].normal.dot(&along).abs() >= LEAST_COSINE)
     }
 

@@ -7,6 +7,7 @@ use super::scan_points::ScanPoint;
 use super::scan_registration::{GAIN, thinned};
 use crate::shared::geometry::Pose2;
 use nalgebra::Matrix3;
+use std::f64::consts::PI;
 use std::ops::Range;
 
 /// Distance of two submaps up to which they may have walls in common, metres, beyond what they are uncertain.
@@ -14,10 +15,10 @@ const COMMON_DISTANCE: f64 = 6.0;
 /// Number of earlier submaps, the nearest ones, in which one is searched: the cost of a submap does not grow with the
 /// time that a robot spends at one place.
 const MAX_SEARCHED: usize = 12;
-/// Half the window of the search in standard deviations, and its bounds, metres and radians.
+/// Half the window of the search in standard deviations, and at least, metres and radians. It has no upper bound: what lies
+/// outside cannot show that the place is another one.
 pub(super) const WINDOW: f64 = 3.0;
 pub(super) const LEAST_WINDOW: [f64; 2] = [0.3, 0.1];
-const LARGEST_WINDOW: [f64; 2] = [4.0, 0.6];
 /// Number of points that the search looks at.
 const SEARCHED_POINTS: usize = 250;
 /// Least mean likelihood of the points at a place that is worth a registration.
@@ -26,6 +27,8 @@ const LEAST_RESPONSE: f64 = 0.35;
 const MAX_SECOND: f64 = 0.85;
 /// What is another place: distance, metres, and turn, radians.
 pub(super) const OTHER_PLACE: [f64; 2] = [0.5, 0.15];
+/// Standard deviation of a position, metres, above which a place is searched in all that may be there.
+const UNCERTAIN: f64 = 0.5;
 /// Share of the information of a registration that a closure has: the submaps are bent themselves.
 const INFORMATION_SHARE: f64 = 0.3;
 
@@ -51,9 +54,6 @@ pub(super) struct Revisit<'a> {
     /// First scan of the local map: what is in it is registered already.
     pub(super) recent: usize,
 }
-
-/// Standard deviation of a position, metres, above which a place is searched in all that may be there.
-const UNCERTAIN: f64 = 0.5;
 
 /// An earlier submap that may be where the last one is.
 #[derive(Clone, Copy, Debug)]
@@ -171,8 +171,8 @@ impl Revisit<'_> {
         let at = middle(&self.submaps[candidate.submap]);
         let deviations = candidate.deviations();
         let map = self.map_of(&self.scans_around(candidate.submap, self.recent), at);
-        let half = |axis: usize| (WINDOW * deviations[axis]).clamp(LEAST_WINDOW[axis], LARGEST_WINDOW[axis]);
-        let window = [half(0), half(0), half(1)];
+        let half = |axis: usize| (WINDOW * deviations[axis]).max(LEAST_WINDOW[axis]);
+        let window = [half(0), half(0), half(1).min(PI)];
         let information = turned_information(&candidate.covariance.try_inverse()?, &mean.rotation);
         let prior = PosePrior { mean: *mean, information, window };
         let searched = thinned(points, SEARCHED_POINTS);

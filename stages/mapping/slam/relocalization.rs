@@ -11,29 +11,36 @@ use super::pose_graph::{Constraint, turned_information};
 use super::scan_registration::{GAIN, thinned};
 use crate::shared::geometry::Pose2;
 use nalgebra::{Matrix3, Vector3};
-use std::f64::consts::PI;
+use std::cell::LazyCell;
 
 /// Least mean likelihood of the points at a place where the robot may be: much that was not seen looks alike.
 const LEAST_RESPONSE: f64 = 0.7;
 /// Logarithm of how much likelier than any other a place must be.
 const LEAST_LEAD: f64 = 7.0;
-/// Largest half of the window, metres: a robot that may be farther off is not searched for.
-const LARGEST_WINDOW: f64 = 60.0;
+/// Largest half of the window, metres and radians: a robot that may be farther off is not searched for, which bounds what a
+/// submap costs.
+const LARGEST_WINDOW: [f64; 2] = [30.0, 1.5];
 /// Number of points that are searched for.
 const SEARCHED_POINTS: usize = 750;
 /// Distance of the farthest of them from the middle of the submap, metres.
 const FARTHEST: f64 = 20.0;
 
-/// Ties the last submap to those of the candidates where the scans of its last metres are found. Nothing if they fit nowhere,
-/// or at several places.
-pub(super) fn relocalize(revisit: &Revisit<'_>, candidates: &[Candidate]) -> Vec<Constraint> {
-    match find_place(revisit, candidates) {
-        Some(pose) => closures_at(revisit, &pose, candidates),
-        None => Vec::new(),
+/// Looks for the last submap in the earlier ones that may be at its place, by what is known of their relative poses: in each
+/// by itself where that is certain, and otherwise in all of them. Each in which it fits gives the pose of its middle scan.
+pub(super) fn find_loop_closures(revisit: &Revisit<'_>) -> Vec<Constraint> {
+    let Some(own) = revisit.submaps.last() else { return Vec::new() };
+    let covariances = LazyCell::new(|| revisit.graph.covariances_from(middle(own)));
+    let candidates = revisit.candidates(|scan| covariances[scan]);
+    let certain: Vec<Candidate> = candidates.iter().filter(|other| !other.is_uncertain()).copied().collect();
+    let closures = find_closures(revisit, &revisit.graph.poses[middle(own)], &certain);
+    if !closures.is_empty() || certain.len() == candidates.len() {
+        return closures;
     }
+    find_place(revisit, &candidates).map_or_else(Vec::new, |pose| closures_at(revisit, &pose, &candidates))
 }
 
-/// The pose of the last submap.
+/// The pose of the last submap where the scans of its last metres are found in the candidates. `None` if they fit nowhere, or
+/// at several places.
 fn find_place(revisit: &Revisit<'_>, candidates: &[Candidate]) -> Option<Pose2> {
     let scan = middle(revisit.submaps.last()?);
     let mut points = revisit.points_of(revisit.recent..revisit.submaps.last()?.end, scan);
@@ -45,11 +52,10 @@ fn find_place(revisit: &Revisit<'_>, candidates: &[Candidate]) -> Option<Pose2> 
     let covariance = information.try_inverse()?;
     let [x, y, yaw] = [0, 1, 2].map(|axis| WINDOW * covariance[(axis, axis)].sqrt());
     // Written so that a value that is not a number fails it.
-    if !(x <= LARGEST_WINDOW && y <= LARGEST_WINDOW) {
+    if !(x.max(y) <= LARGEST_WINDOW[0] && yaw <= LARGEST_WINDOW[1]) {
         return None;
     }
-    let window = [x, y, yaw.min(PI)];
-    let prior = PosePrior { mean: poses[scan], information, window };
+    let prior = PosePrior { mean: poses[scan], information, window: [x, y, yaw] };
     let scans = candidates.iter().flat_map(|candidate| revisit.submaps[candidate.submap].clone());
     let walls = scans.flat_map(|scan| revisit.scans[scan].iter().map(move |point| poses[scan] * point.place));
     let field = LikelihoodField::new(walls, &prior.reach(&searched), x.max(y));

@@ -2,16 +2,16 @@
 
 use super::contradictions::{Contradictions, PlacedScan, find_contradictions};
 use super::local_map::LocalMap;
-use super::loop_closure::{Candidate, Drive, Revisit, find_closures, middle};
+use super::loop_closure::{Drive, Revisit};
 use super::odometry_noise::OdometryNoise;
 use super::pose_graph::{Constraint, LandmarkSighting, PoseGraph, turned_information};
-use super::relocalization::relocalize;
+use super::relocalization::find_loop_closures;
 use super::revisits::refine;
 use super::scan_points::ScanPoint;
 use super::scan_registration::{WELL_MATCHED, register};
 use crate::shared::geometry::{Point2, Pose2};
 use nalgebra::{Matrix3, UnitComplex, Vector2, Vector3};
-use std::cell::{LazyCell, OnceCell};
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::slice;
@@ -321,7 +321,7 @@ impl Trajectory {
         let (drive, scans) = (self.drive(), self.scans().collect::<Vec<_>>());
         let drives = slice::from_ref(&drive);
         let revisit = Revisit { graph: &self.graph, scans: &scans, submaps: &self.submaps, drives, recent };
-        let found = self.loop_closures(&revisit);
+        let found = find_loop_closures(&revisit);
         let has_closed = !found.is_empty();
         self.graph.constraints.extend(found);
         if has_closed {
@@ -330,20 +330,6 @@ impl Trajectory {
         self.revisited = self.tied_submaps(recent);
         self.local_map.take();
         has_closed || has_seen_again
-    }
-
-    /// The loop closures of the last submap.
-    fn loop_closures(&self, revisit: &Revisit<'_>) -> Vec<Constraint> {
-        let Some(own) = revisit.submaps.last() else { return Vec::new() };
-        let covariances = LazyCell::new(|| self.graph.covariances_from(middle(own)));
-        let candidates = revisit.candidates(|scan| covariances[scan]);
-        let certain: Vec<Candidate> =
-            candidates.iter().filter(|candidate| !candidate.is_uncertain()).copied().collect();
-        let closures = find_closures(revisit, &self.graph.poses[middle(own)], &certain);
-        match closures.is_empty() && certain.len() < candidates.len() {
-            true => relocalize(revisit, &candidates),
-            false => closures,
-        }
     }
 
     /// Finishes the last submap, and registers each scan on what was seen at its place at other times. Returns whether

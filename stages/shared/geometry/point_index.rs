@@ -119,8 +119,8 @@ impl PointIndex {
     }
 
     /// Indices in [`points`](Self::points) of the points within `radius` of `point`, in their order.
-    pub fn within(&self, point: &Point2, radius: f64) -> impl Iterator<Item = usize> {
-        let buckets = self.buckets;
+    pub fn within<'a>(&'a self, point: &Point2, radius: f64) -> impl Iterator<Item = usize> + use<'a> {
+        let (buckets, point) = (self.buckets, *point);
         let (first_row, last_row) = (buckets.row(point.y - radius), buckets.row(point.y + radius));
         let (first, last) = (buckets.column(point.x - radius), buckets.column(point.x + radius));
         let is_near = move |index: &usize| (self.points[*index] - point).norm_squared() <= radius * radius;
