@@ -52,7 +52,7 @@ fn find_place(revisit: &Revisit<'_>, candidates: &[Candidate]) -> Option<Pose2> 
     let covariance = information.try_inverse()?;
     let [x, y, yaw] = [0, 1, 2].map(|axis| WINDOW * covariance[(axis, axis)].sqrt());
     // Written so that a value that is not a number fails it.
-    if !(x.max(y) <= LARGEST_WINDOW[0] && yaw <= LARGEST_WINDOW[1]) {
+    if !(x <= LARGEST_WINDOW[0] && y <= LARGEST_WINDOW[0] && yaw <= LARGEST_WINDOW[1]) {
         return None;
     }
     let prior = PosePrior { mean: poses[scan], information, window: [x, y, yaw] };
