@@ -89,14 +89,6 @@ impl<'a> MappedRobot<'a> {
         }
     }
 
-    /// Positions of the lidar at the scans, in the frame of the base.
-    fn lidars(&self) -> Vec<Point2> {
-        match &self.source {
-            Source::Scans(slam) => slam.lidars(),
-            Source::Recorded(_) => Vec::new(),
-        }
-    }
-
     fn is_recorded(&self) -> bool {
         matches!(self.source, Source::Recorded(_))
     }
@@ -160,12 +152,9 @@ fn refine_group(group: &[Member], robots: &mut [MappedRobot<'_>], parameters: &S
     let poses = joint_poses(&group.iter().map(framed).collect::<Vec<_>>());
     let joined = group.iter().zip(poses).filter_map(|(member, poses)| Some((member.robot, poses?)));
     let joined: Vec<(usize, Vec<Pose2>)> = joined.collect();
-    let lidars: Vec<Vec<Point2>> = joined.iter().map(|(robot, _)| robots[*robot].lidars()).collect();
-    let placed = joined.iter().zip(&lidars);
-    let placed = placed.map(|((robot, poses), lidars)| (robots[*robot].trajectory(), &poses[..], &lidars[..]));
+    let placed = joined.iter().map(|(robot, poses)| (robots[*robot].trajectory(), &poses[..]));
     let found = joint_contradictions(&placed.collect::<Vec<_>>());
-    let is_right = found.contradicting.len() as f64 <= parameters.max_contradicting * found.revisiting as f64;
-    if joined.len() < 2 || !is_right {
+    if joined.len() < 2 || found.are_more_than(parameters.max_contradicting) {
         return 0;
     }
     let mut count = 0;

@@ -1,5 +1,6 @@
 //! Parameters of the stage.
 
+use crate::mapping::slam::MAX_CONTRADICTING;
 use crate::shared::log_odds::log_odds;
 use crate::shared::scan_grid::BeamEvidence;
 use gridweave_runtime::stage::Parameters;
@@ -97,7 +98,7 @@ impl Default for ScanMapperParameters {
             step: 0.2,
             step_yaw: 0.2,
             odometry_deviation: 0.1,
-            max_contradicting: 0.06,
+            max_contradicting: MAX_CONTRADICTING,
             sighting_stddev: 0.05,
             joint_refinement: true,
         }

@@ -141,7 +141,8 @@ impl SlamMap {
     pub(super) fn add(&mut self, time: LogTime, odometry: &Pose2, scan: &ScanBeams) -> bool {
         let moved = self.scans.last().map_or_else(Pose2::identity, |last| last.odometry.inv_mul(odometry));
         let before = self.trajectory.unmatched();
-        if self.trajectory.add(&moved, points(scan)) {
+        let lidar = scan.transform_base_lidar.translation.vector.into();
+        if self.trajectory.add(&moved, points(scan), lidar) {
             self.forget_map();
         }
         let still =
@@ -183,11 +184,6 @@ impl SlamMap {
     /// Pose of the first scan in the map.
     pub(super) fn transform_map_trajectory(&self) -> Pose2 {
         self.scans.first().map_or_else(Pose2::identity, |first| first.odometry)
-    }
-
-    /// Positions of the lidar at the scans, in the frame of the base.
-    pub(super) fn lidars(&self) -> Vec<Point2> {
-        self.scans.iter().map(|scan| scan.transform_base_lidar.translation.vector.into()).collect()
     }
 
     /// Moves the scans to poses in any frame; the map's frame stays where it was.
@@ -280,7 +276,7 @@ impl SlamMap {
             count == *tested || !is_end && (count as f64) < TESTED_AGAIN * *tested as f64
         };
         if !self.tested.as_ref().is_some_and(is_tested) {
-            let found = self.trajectory.contradictions(&self.lidars());
+            let found = self.trajectory.contradictions();
             self.tested = Some((count, found));
         }
     }

@@ -29,6 +29,10 @@ const LEAST_BEAMS: usize = 8;
 /// and things that were moved are some of them, a wall that is drawn twice is most.
 const MAX_PASSING: f64 = 1.0 / 3.0;
 
+/// Share of the scans that see walls again from which a map of which they contradict it is wrong. The benchmark
+/// `scan_contradictions.py` fits it to simulated drives.
+pub const MAX_CONTRADICTING: f64 = 0.06;
+
 /// How often scans contradict walls that were seen at other times.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Contradictions {
@@ -36,6 +40,13 @@ pub struct Contradictions {
     pub revisiting: usize,
     /// Those of them that contradict these walls, in their order.
     pub contradicting: Vec<usize>,
+}
+
+impl Contradictions {
+    /// Whether more than a share of the scans that see walls again contradict them.
+    pub fn are_more_than(&self, share: f64) -> bool {
+        self.contradicting.len() as f64 > share * self.revisiting as f64
+    }
 }
 
 /// A scan at its place in the map.

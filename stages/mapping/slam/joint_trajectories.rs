@@ -11,7 +11,7 @@ use super::pose_graph::{Constraint, LandmarkSighting, PoseGraph};
 use super::revisits::refine;
 use super::scan_points::ScanPoint;
 use super::trajectory::{RECENT_SCANS, Trajectory};
-use crate::shared::geometry::{Point2, Pose2};
+use crate::shared::geometry::Pose2;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -54,11 +54,10 @@ pub fn joint_poses(robots: &[FramedTrajectory<'_>]) -> Vec<Option<Vec<Pose2>>> {
 }
 
 /// Compares each scan with the walls that other robots saw, and with those that its own robot saw at other times. For
-/// each robot the poses of the scans in the common frame, and the positions of the lidar in the frame of the base; none for a
-/// recorded map.
-pub fn joint_contradictions(robots: &[(&Trajectory, &[Pose2], &[Point2])]) -> Contradictions {
+/// each robot the poses of the scans in the common frame.
+pub fn joint_contradictions(robots: &[(&Trajectory, &[Pose2])]) -> Contradictions {
     let placed = robots.iter().enumerate();
-    let placed = placed.flat_map(|(drive, (trajectory, poses, lidars))| trajectory.placed_scans(poses, lidars, drive));
+    let placed = placed.flat_map(|(drive, (trajectory, poses))| trajectory.placed_scans(poses, drive));
     find_contradictions(&placed.collect::<Vec<_>>(), RECENT_SCANS)
 }
 

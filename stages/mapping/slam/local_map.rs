@@ -37,7 +37,7 @@ pub struct LocalMap {
     points: Vec<Point2>,
     surfaces: Vec<Surface>,
     index: PointIndex,
-    /// Points without a normal: legs of tables, corners, and clutter.
+    /// Points without a normal, away from walls: legs of tables, and clutter.
     spots: PointIndex,
 }
 
@@ -46,7 +46,9 @@ pub struct LocalMap {
 pub struct Match {
     /// Pose of the points' frame in the map's.
     pub pose: Pose2,
-    /// Inverse of the covariance of (x, y, yaw) in the map's frame by the matches alone.
+    /// Inverse of the covariance of (x, y, yaw) in the map's frame by the matches alone. Each match counts by the product of
+    /// the normals of the wall and of the point, whose errors are independent: the square of one alone would grow with its
+    /// noise, as if a bare wall showed where along it the points are.
     pub information: Matrix3<f64>,
     /// Share of the points that lie on the map: those with a normal on a surface of the same direction.
     pub matched: f64,
@@ -86,6 +88,8 @@ impl LocalMap {
         let places: Vec<Point2> = unsorted.iter().map(|surface| surface.place).collect();
         let (index, order) = PointIndex::new(&places, SURFACE_CELL);
         let surfaces = order.into_iter().map(|place| unsorted[place]).collect();
+        // What lies at a wall is part of it, or a corner of it: where along the wall it was seen is noise.
+        spots.retain(|spot| index.nearest(spot, LAST_RADIUS).is_none());
         let (spots, _) = PointIndex::new(&spots, SURFACE_CELL);
         Self { points, surfaces, index, spots }
     }
@@ -134,6 +138,8 @@ struct MovingScan<'a> {
 struct MoveEquations {
     matrix: Matrix3<f64>,
     vector: Vector3<f64>,
+    /// The matrix with the points' own normals on one side.
+    information: Matrix3<f64>,
     /// Share of the points that lie on the map.
     matched: f64,
 }
@@ -159,7 +165,7 @@ impl<'a> MovingScan<'a> {
                 break;
             }
         }
-        Match { pose: self.pose, information: equations.matrix, matched: equations.matched }
+        Match { pose: self.pose, information: positive_part(&equations.information), matched: equations.matched }
     }
 
     /// The move that fits the equations and the prior best.
@@ -182,43 +188,60 @@ impl<'a> MovingScan<'a> {
     /// The equations by the points that have a wall or a spot within `radius`.
     fn equations(&mut self, radius: f64) -> MoveEquations {
         let (map, pose) = (self.map, &self.pose);
-        let (mut matrix, mut vector) = (Matrix3::zeros(), Vector3::zeros());
+        let (mut matrix, mut vector, mut information) = (Matrix3::zeros(), Vector3::zeros(), Matrix3::zeros());
         let mut matched = 0;
         // Neighbouring points of a wall are one measurement.
-        let information = SPACING / CORRELATION_LENGTH / (DEVIATION * DEVIATION);
+        let of_point = SPACING / CORRELATION_LENGTH / (DEVIATION * DEVIATION);
         let width = WEIGHT_WIDTH * radius;
+        let weight = |squared_distance: f64| of_point * (-0.5 * squared_distance / (width * width)).exp();
         let mut before = usize::MAX;
         for (point, lookup) in self.scan.iter().zip(&mut self.lookups) {
             let arm = pose.rotation * point.place.coords;
             let place = pose.translation.vector + arm;
+            let row = |by: &Vector2<f64>| Vector3::new(by.x, by.y, by.dot(&quarter_turn(&arm)));
             let index = if point.normal.is_some() { &map.index } else { &map.spots };
-            let Some(found) = lookup.nearest(index, &place.into(), radius, before) else { continue };
-            before = found.index;
-            let Some(normal) = point.normal else {
-                let off = map.spots.points()[found.index].coords - place;
-                let weight = information * (-0.5 * off.norm_squared() / (width * width)).exp();
-                matched += 1;
-                for by in [Vector2::x(), Vector2::y()] {
-                    let row = Vector3::new(by.x, by.y, by.dot(&quarter_turn(&arm)));
-                    matrix += weight * row * row.transpose();
-                    vector += weight * off.dot(&by) * row;
+            let found = lookup.nearest(index, &place.into(), radius, before).map(|found| found.index);
+            before = found.unwrap_or(before);
+            let normal = point.normal.map(|normal| pose.rotation * normal);
+            let surface = match (normal, found) {
+                (None, Some(spot)) => {
+                    matched += 1;
+                    let off = map.spots.points()[spot].coords - place;
+                    let weight = weight(off.norm_squared());
+                    for row in [row(&Vector2::x()), row(&Vector2::y())] {
+                        matrix += weight * row * row.transpose();
+                        information += weight * row * row.transpose();
+                    }
+                    vector += weight * (row(&Vector2::x()) * off.x + row(&Vector2::y()) * off.y);
+                    continue;
                 }
-                continue;
+                (None, None) => map.index.nearest(&place.into(), radius).map(|found| found.index),
+                (Some(_), found) => found,
             };
-            let surface = &map.surfaces[found.index];
-            if surface.normal.dot(&(pose.rotation * normal)) < LEAST_NORMAL_AGREEMENT {
+            let Some(surface) = surface.map(|surface| &map.surfaces[surface]) else { continue };
+            if normal.is_some_and(|normal| surface.normal.dot(&normal) < LEAST_NORMAL_AGREEMENT) {
                 continue;
             }
             matched += 1;
             let off = surface.normal.dot(&(surface.place.coords - place));
-            let weight = information * (-0.5 * (off / width).powi(2)).exp();
-            let by = surface.normal;
-            let row = Vector3::new(by.x, by.y, by.dot(&quarter_turn(&arm)));
-            matrix += weight * row * row.transpose();
-            vector += weight * off * row;
+            let by_wall = weight(off * off) * row(&surface.normal);
+            matrix += by_wall * row(&surface.normal).transpose();
+            vector += by_wall * off;
+            if let Some(normal) = normal {
+                information += by_wall * row(&normal).transpose();
+            }
         }
-        MoveEquations { matrix, vector, matched: f64::from(matched) / self.scan.len().max(1) as f64 }
+        let matched = f64::from(matched) / self.scan.len().max(1) as f64;
+        MoveEquations { matrix, vector, information, matched }
     }
+}
+
+/// The symmetric matrix without negative eigenvalues that is nearest to one (Higham 1988, "Computing a nearest symmetric
+/// positive semidefinite matrix").
+fn positive_part(matrix: &Matrix3<f64>) -> Matrix3<f64> {
+    let mut eigen = (0.5 * (matrix + matrix.transpose())).symmetric_eigen();
+    eigen.eigenvalues = eigen.eigenvalues.map(|value| value.max(0.0));
+    eigen.recompose()
 }
 
 /// The cell of a place and the sector of a direction, as one number.

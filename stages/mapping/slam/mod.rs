@@ -4,8 +4,8 @@
 //! odometry finds the basin (Olson 2009), and point-to-line registration the pose (Censi 2008). Scans are gathered in
 //! submaps of some metres. A finished submap is searched in each earlier one that may be at the same place, by branch
 //! and bound on a likelihood field; what fits, and fits nowhere else, becomes a loop closure. After a long way, when a pose is
-//! less certain than places that look alike are apart, the last metres are searched in all that may be there at once. Scans are the nodes of a
-//! pose graph, whose most likely poses are solved for after each closure, with a robust weight for closures. At the end
+//! less certain than places that look alike are apart, the last metres are searched in all that may be there at once, and a
+//! place at which beams pass through walls is another one. Scans are the nodes of a pose graph, whose most likely poses are solved for after each closure, with a robust weight for closures. At the end
 //! each scan is registered on what was seen at its place at other times, by any of the robots whose relative poses are known
 //! ([`joint_poses`]), or on a [recorded map](recorded_map). Tags that are seen are landmarks of the graph.
 //!
@@ -32,7 +32,7 @@ mod scan_registration;
 mod tests;
 mod trajectory;
 
-pub use contradictions::Contradictions;
+pub use contradictions::{Contradictions, MAX_CONTRADICTING};
 pub use joint_trajectories::{FramedTrajectory, joint_contradictions, joint_poses};
 pub use local_map::LocalMap;
 pub use odometry_noise::OdometryNoise;

@@ -2,19 +2,21 @@
 //!
 //! After a long way a pose is less certain than two doors of a corridor are apart. Where a robot then fits into one submap
 //! it may fit into others as well, which the search of one alone does not see. So the scans of its last metres are searched in
-//! all submaps at once, within all that is uncertain. Where most of them fit at one place alone, the robot has been there.
+//! all submaps at once, within all that is uncertain. Where most of them fit at one place alone, and no beams pass through
+//! walls there, the robot has been there: what looks alike is seldom alike all along such a way.
 
+use super::contradictions::{MAX_CONTRADICTING, PlacedScan, find_contradictions};
 use super::correlative_search::{Excluded, PosePrior, search};
 use super::likelihood_field::LikelihoodField;
 use super::loop_closure::{Candidate, LEAST_WINDOW, OTHER_PLACE, Revisit, WINDOW, find_closures, middle};
 use super::pose_graph::{Constraint, turned_information};
 use super::scan_registration::{GAIN, thinned};
-use crate::shared::geometry::Pose2;
+use crate::shared::geometry::{Point2, Pose2};
 use nalgebra::{Matrix3, Vector3};
 use std::cell::LazyCell;
 
 /// Least mean likelihood of the points at a place where the robot may be: much that was not seen looks alike.
-const LEAST_RESPONSE: f64 = 0.7;
+const LEAST_RESPONSE: f64 = 0.6;
 /// Logarithm of how much likelier than any other a place must be.
 const LEAST_LEAD: f64 = 7.0;
 /// Largest half of the window, metres and radians: a robot that may be farther off is not searched for, which bounds what a
@@ -27,7 +29,8 @@ const FARTHEST: f64 = 20.0;
 
 /// Looks for the last submap in the earlier ones that may be at its place, by what is known of their relative poses: in each
 /// by itself where that is certain, and otherwise in all of them. Each in which it fits gives the pose of its middle scan.
-pub(super) fn find_loop_closures(revisit: &Revisit<'_>) -> Vec<Constraint> {
+/// `lidars` are the positions of the lidar at the scans, in the frame of the base.
+pub(super) fn find_loop_closures(revisit: &Revisit<'_>, lidars: &[Point2]) -> Vec<Constraint> {
     let Some(own) = revisit.submaps.last() else { return Vec::new() };
     let covariances = LazyCell::new(|| revisit.graph.covariances_from(middle(own)));
     let candidates = revisit.candidates(|scan| covariances[scan]);
@@ -36,7 +39,10 @@ pub(super) fn find_loop_closures(revisit: &Revisit<'_>) -> Vec<Constraint> {
     if !closures.is_empty() || certain.len() == candidates.len() {
         return closures;
     }
-    find_place(revisit, &candidates).map_or_else(Vec::new, |pose| closures_at(revisit, &pose, &candidates))
+    match find_place(revisit, &candidates).filter(|pose| !is_contradicted(revisit, lidars, pose, &candidates)) {
+        Some(pose) => closures_at(revisit, &pose, &candidates),
+        None => Vec::new(),
+    }
 }
 
 /// The pose of the last submap where the scans of its last metres are found in the candidates. `None` if they fit nowhere, or
@@ -68,6 +74,24 @@ fn find_place(revisit: &Revisit<'_>, candidates: &[Candidate]) -> Option<Pose2> 
         return None;
     }
     Some(found.pose)
+}
+
+/// Whether the scans of the last metres contradict the candidates, or these them, where the last submap is at a pose.
+fn is_contradicted(revisit: &Revisit<'_>, lidars: &[Point2], pose: &Pose2, candidates: &[Candidate]) -> bool {
+    let Some(own) = revisit.submaps.last() else { return false };
+    let poses = &revisit.graph.poses;
+    let moved = pose * poses[middle(own)].inverse();
+    let placed = |scan: usize, pose: Pose2, drive: usize| PlacedScan {
+        points: revisit.scans[scan],
+        pose,
+        lidar: lidars.get(scan).copied(),
+        drive,
+    };
+    let last = (revisit.recent..own.end).map(|scan| placed(scan, moved * poses[scan], 0));
+    let earlier = candidates.iter().flat_map(|candidate| revisit.submaps[candidate.submap].clone());
+    let scans: Vec<PlacedScan<'_>> = last.chain(earlier.map(|scan| placed(scan, poses[scan], 1))).collect();
+    // Those of one side contradict each other neither more nor less for the place.
+    find_contradictions(&scans, scans.len()).are_more_than(MAX_CONTRADICTING)
 }
 
 /// Ties the last submap, which is at a pose, to the nearest of the candidates there.

@@ -103,7 +103,7 @@ fn a_drive_around_a_block_is_closed_though_odometry_turns_too_far() {
         if step > 0 {
             odometry.push(odometry[step - 1] * moved);
         }
-        has_moved |= trajectory.add(&moved, scan(&walls, at, &mut random));
+        has_moved |= trajectory.add(&moved, scan(&walls, at, &mut random), Point2::origin());
     }
     has_moved |= trajectory.finish_submap();
     let (closed, start) = (error(trajectory.poses(), &truth), trajectory.poses()[..5].to_vec());
@@ -133,7 +133,7 @@ fn scans_without_anything_in_common_are_unmatched_and_keep_their_poses_by_odomet
     let mut trajectory = Trajectory::new(0.1);
     for (step, at) in truth.iter().enumerate().take(10) {
         let moved = if step == 0 { Pose2::identity() } else { pose(40.0, 0.0, 0.0) };
-        trajectory.add(&moved, scan(&walls, at, &mut random));
+        trajectory.add(&moved, scan(&walls, at, &mut random), Point2::origin());
     }
     assert_eq!(trajectory.unmatched(), 9);
     assert!((trajectory.poses()[9].translation.vector.x - 360.0).abs() < 1e-9);
@@ -147,7 +147,7 @@ fn what_was_registered_can_be_located_without_adding_it() {
     assert!(trajectory.locate(&Pose2::identity(), [0.1; 2], &[]).is_none());
     for (step, at) in truth.iter().enumerate().take(4) {
         let moved = if step == 0 { Pose2::identity() } else { pose(STEP, 0.0, 0.0) };
-        trajectory.add(&moved, scan(&walls, at, &mut random));
+        trajectory.add(&moved, scan(&walls, at, &mut random), Point2::origin());
     }
     let at = truth[3] * pose(0.2, 0.05, 0.1);
     let found = trajectory.locate(&Pose2::identity(), [0.1; 2], &scan(&walls, &at, &mut random)).unwrap();
@@ -207,7 +207,7 @@ fn driven(walls: &[[Point2; 2]], truth: &[Pose2], metres: f64, seed: u64) -> Tra
         let (way, turn) = (moved.translation.vector * 1.05, 0.03 * moved.translation.vector.norm());
         let mut points = scan(walls, at, &mut random);
         points.retain(|point| point.place.coords.norm() < metres);
-        trajectory.add(&pose(way.x, way.y, moved.rotation.angle() + turn), points);
+        trajectory.add(&pose(way.x, way.y, moved.rotation.angle() + turn), points, Point2::origin());
         last = *at;
     }
     trajectory.finish();
@@ -238,11 +238,10 @@ fn robots_in_one_graph_straighten_each_other_and_one_elsewhere_is_left_out() {
         "{alone} m alone, and {after} m with the other, {in_common}"
     );
 
-    let lidars = vec![Point2::origin(); truth.len()];
     let contradicting = |by: f64| {
         let moved: Vec<Pose2> = together.iter().map(|at| pose(0.0, by, 0.0) * at).collect();
         let other = found[0].as_ref().unwrap();
-        joint_contradictions(&[(&closed, other, &lidars), (&open, &moved, &lidars)]).contradicting.len()
+        joint_contradictions(&[(&closed, other), (&open, &moved)]).contradicting.len()
     };
     assert_eq!(contradicting(0.0), 0);
     assert!(contradicting(0.6) > 30, "{}", contradicting(0.6));
@@ -263,7 +262,8 @@ fn tags_that_are_seen_again_close_a_loop_where_scans_show_nothing() {
     for (step, at) in truth.iter().enumerate() {
         let moved = truth[step.saturating_sub(1)].inv_mul(at);
         let turn = moved.rotation.angle() + 0.006 * moved.translation.vector.norm();
-        closed_on_the_way |= trajectory.add(&pose(moved.translation.x, moved.translation.y, turn), Vec::new());
+        closed_on_the_way |=
+            trajectory.add(&pose(moved.translation.x, moved.translation.y, turn), Vec::new(), Point2::origin());
         for (tag, place) in tags {
             let seen = at.inverse() * place;
             let noise = |random: &mut ChaCha8Rng| random.random_range(-0.03..0.03);
@@ -308,10 +308,9 @@ fn scans_are_straightened_by_a_recorded_map_which_stays_as_it_is() {
         let off = before.inv_mul(after);
         assert!(off.translation.vector.norm() < 2e-3 && off.rotation.angle().abs() < 2e-3, "{off}");
     }
-    let lidars = vec![Point2::origin(); half.len()];
     let contradicting = |by: f64| {
         let moved: Vec<Pose2> = together.iter().map(|at| pose(0.0, by, 0.0) * at).collect();
-        joint_contradictions(&[(&recorded, squares, &[]), (&open, &moved, &lidars)]).contradicting.len()
+        joint_contradictions(&[(&recorded, squares), (&open, &moved)]).contradicting.len()
     };
     assert_eq!(contradicting(0.0), 0);
     assert!(contradicting(0.6) > 10, "{}", contradicting(0.6));
@@ -330,7 +329,7 @@ fn a_tag_that_is_seen_again_from_the_last_scan_alone_counts() {
     for (step, at) in truth.iter().enumerate().take(again + 1) {
         let moved = truth[step.saturating_sub(1)].inv_mul(at);
         let turn = moved.rotation.angle() + 0.006 * moved.translation.vector.norm();
-        trajectory.add(&pose(moved.translation.x, moved.translation.y, turn), Vec::new());
+        trajectory.add(&pose(moved.translation.x, moved.translation.y, turn), Vec::new(), Point2::origin());
         if step == 5 {
             trajectory.see(step, "family:1", seen(step), 0.03);
         }

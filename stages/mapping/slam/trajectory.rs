@@ -64,6 +64,8 @@ pub struct Trajectory {
     graph: PoseGraph,
     /// The points of each scan, in the frame of the base.
     scans: Vec<Vec<ScanPoint>>,
+    /// Position of the lidar at each scan, in the frame of the base. A recorded map has none.
+    lidars: Vec<Point2>,
     /// Path of odometry up to each scan, metres.
     paths: Vec<f64>,
     submaps: Vec<Range<usize>>,
@@ -87,6 +89,7 @@ impl Trajectory {
             noise: OdometryNoise::new(odometry_deviation),
             graph: PoseGraph::default(),
             scans: Vec::new(),
+            lidars: Vec::new(),
             paths: Vec::new(),
             submaps: Vec::new(),
             submap_start: 0,
@@ -173,24 +176,18 @@ impl Trajectory {
         self.noise.scale()
     }
 
-    /// Compares each scan with the walls that were seen at other times than its own. `lidars` are the positions of the
-    /// lidar at the scans, in the frame of the base.
-    pub fn contradictions(&self, lidars: &[Point2]) -> Contradictions {
-        find_contradictions(&self.placed_scans(&self.graph.poses, lidars, 0).collect::<Vec<_>>(), RECENT_SCANS)
+    /// Compares each scan with the walls that were seen at other times than its own.
+    pub fn contradictions(&self) -> Contradictions {
+        find_contradictions(&self.placed_scans(&self.graph.poses, 0).collect::<Vec<_>>(), RECENT_SCANS)
     }
 
-    /// The scans at poses that need not be those of the graph, as of the given drive. There are no lidars of a recorded map.
-    pub(super) fn placed_scans<'a>(
-        &'a self,
-        poses: &'a [Pose2],
-        lidars: &'a [Point2],
-        drive: usize,
-    ) -> impl Iterator<Item = PlacedScan<'a>> {
+    /// The scans at poses that need not be those of the graph, as of the given drive.
+    pub(super) fn placed_scans<'a>(&'a self, poses: &'a [Pose2], drive: usize) -> impl Iterator<Item = PlacedScan<'a>> {
         let scans = self.scans.iter().zip(poses).enumerate();
         scans.map(move |(scan, (points, pose))| PlacedScan {
             points,
             pose: *pose,
-            lidar: lidars.get(scan).copied(),
+            lidar: self.lidars.get(scan).copied(),
             drive,
         })
     }
@@ -203,9 +200,10 @@ impl Trajectory {
         self.local_map.take();
     }
 
-    /// Adds a scan of a robot that has moved by `moved` since the last one, by odometry. Returns whether a loop
-    /// closure has moved earlier scans.
-    pub fn add(&mut self, moved: &Pose2, points: Vec<ScanPoint>) -> bool {
+    /// Adds a scan of a robot that has moved by `moved` since the last one, by odometry: its points, and the position of the
+    /// lidar, in the frame of the base. Returns whether a loop closure has moved earlier scans.
+    pub fn add(&mut self, moved: &Pose2, points: Vec<ScanPoint>, lidar: Point2) -> bool {
+        self.lidars.push(lidar);
         let Some(last) = self.graph.poses.last().copied() else {
             self.push(Pose2::identity(), 0.0, points);
             return false;
@@ -321,7 +319,7 @@ impl Trajectory {
         let (drive, scans) = (self.drive(), self.scans().collect::<Vec<_>>());
         let drives = slice::from_ref(&drive);
         let revisit = Revisit { graph: &self.graph, scans: &scans, submaps: &self.submaps, drives, recent };
-        let found = find_loop_closures(&revisit);
+        let found = find_loop_closures(&revisit, &self.lidars);
         let has_closed = !found.is_empty();
         self.graph.constraints.extend(found);
         if has_closed {
