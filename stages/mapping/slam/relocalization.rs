@@ -16,7 +16,7 @@ use nalgebra::{Matrix3, Vector3};
 use std::cell::LazyCell;
 
 /// Least mean likelihood of the points at a place where the robot may be: much that was not seen looks alike.
-const LEAST_RESPONSE: f64 = 0.6;
+const LEAST_RESPONSE: f64 = 0.7;
 /// Logarithm of how much likelier than any other a place must be.
 const LEAST_LEAD: f64 = 7.0;
 /// Largest half of the window, metres and radians: a robot that may be farther off is not searched for, which bounds what a

@@ -1,7 +1,6 @@
 //! The hits of a scan as points with normals.
 
 use crate::shared::geometry::Point2;
-use crate::shared::walls::DEVIATION;
 use nalgebra::{Matrix2, Vector2};
 
 /// Distance between points that are kept, metres: near the lidar beams lie closer than that, and would count as more
@@ -22,9 +21,6 @@ const NORMAL_BEAMS: f64 = 2.5;
 const MAX_NORMAL_RADIUS: f64 = 0.6;
 /// Largest standard deviation of points across a wall, as a share of that along it.
 const MAX_THICKNESS: f64 = 0.25;
-/// Least number of hits about one that are a wall in a wider radius, up to [`MAX_NORMAL_RADIUS`], where its ranges deviate
-/// too much for a smaller one: fewer may lie along a line by chance. They deviate by no more than [`DEVIATION`] across it.
-const NOISY_HITS: usize = 9;
 /// Largest distance of a hit from the line through those beside it, metres, for all three to be on a wall though they
 /// lie far apart: ranges deviate by one or two centimetres, and most of that is along a wall that is grazed.
 const MAX_BEND: f64 = 0.02;
@@ -81,20 +77,15 @@ fn kind(hits: &[Point2], index: usize, lidar: &Point2) -> HitKind {
     let [before, after] = [index.checked_sub(1).and_then(|before| hits.get(before)), hits.get(index + 1)];
     let beside = |other: Option<&Point2>| other.map_or(f64::INFINITY, |other| (other - at).norm());
     let radius = (NORMAL_BEAMS * beside(before).min(beside(after))).clamp(NORMAL_RADIUS, MAX_NORMAL_RADIUS);
-    let near = |radius: f64| {
-        let is_near = move |other: &&Point2| (*other - at).norm() <= radius;
-        let near_before = hits[..index].iter().rev().take(MAX_NEIGHBOURS).take_while(is_near);
-        near_before.chain(hits[index + 1..].iter().take(MAX_NEIGHBOURS).take_while(is_near))
-    };
-    if near(radius).nth(1).is_some() {
-        let of_noisy_hits = |radius: f64| {
-            let has_many = near(radius).nth(NOISY_HITS - 1).is_some();
-            normal(&at, near(radius), lidar, DEVIATION).filter(|_| has_many)
+    let is_near = |other: &&Point2| (*other - at).norm() <= radius;
+    let near_before = hits[..index].iter().rev().take(MAX_NEIGHBOURS).take_while(is_near);
+    let near_after = hits[index + 1..].iter().take(MAX_NEIGHBOURS).take_while(is_near);
+    let near = near_before.chain(near_after);
+    if near.clone().nth(1).is_some() {
+        return match normal(&at, near, lidar) {
+            Some(normal) => HitKind::Wall(normal),
+            None => HitKind::Spot,
         };
-        let wider = [2.0 * radius, 4.0 * radius].map(|wide| wide.min(MAX_NORMAL_RADIUS));
-        let found =
-            normal(&at, near(radius), lidar, f64::INFINITY).or_else(|| wider.into_iter().find_map(of_noisy_hits));
-        return found.map_or(HitKind::Spot, HitKind::Wall);
     }
     let range = (at - lidar).norm();
     let is_behind = |other: Option<&Point2>| other.is_some_and(|other| (other - lidar).norm() > range);
@@ -103,7 +94,7 @@ fn kind(hits: &[Point2], index: usize, lidar: &Point2) -> HitKind {
     }
     match (before, after) {
         (Some(before), Some(after)) if is_between(&at, before, after) => {
-            normal(&at, [before, after].into_iter(), lidar, f64::INFINITY).map_or(HitKind::Grazed, HitKind::Wall)
+            normal(&at, [before, after].into_iter(), lidar).map_or(HitKind::Grazed, HitKind::Wall)
         }
         _ => HitKind::Grazed,
     }
@@ -115,14 +106,8 @@ fn is_between(at: &Point2, before: &Point2, after: &Point2) -> bool {
     along.perp(&arm).abs() <= MAX_BEND * along.norm()
 }
 
-/// The normal of the line through a hit and others: the direction in which they vary least. `None` if they are not on a line,
-/// or deviate by more than `most` metres from it.
-fn normal<'a>(
-    at: &Point2,
-    others: impl Iterator<Item = &'a Point2>,
-    lidar: &Point2,
-    most: f64,
-) -> Option<Vector2<f64>> {
+/// The normal of the line through a hit and others: the direction in which they vary least.
+fn normal<'a>(at: &Point2, others: impl Iterator<Item = &'a Point2>, lidar: &Point2) -> Option<Vector2<f64>> {
     let (mut count, mut sum, mut squares) = (1.0, Vector2::zeros(), Matrix2::zeros());
     for other in others {
         let arm = other - at;
@@ -138,7 +123,7 @@ fn normal<'a>(
         false => (1, 0),
     };
     let [thin, long] = [across, along].map(|axis| eigen.eigenvalues[axis].max(0.0).sqrt());
-    if thin > most.min(MAX_THICKNESS * long) {
+    if thin > MAX_THICKNESS * long {
         return None;
     }
     let normal: Vector2<f64> = eigen.eigenvectors.column(across).into();
