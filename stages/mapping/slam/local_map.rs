@@ -271,6 +271,7 @@ fn sector(direction: &Vector2<f64>) -> u64 {
 mod tests {
     use super::*;
     use crate::shared::geometry::pose;
+    use nalgebra::UnitComplex;
 
     /// Walls with their normals, as seen from the inside of a room of 6 by 4 metres.
     fn walls(sides: &[[f64; 4]]) -> Vec<ScanPoint> {
@@ -319,6 +320,28 @@ mod tests {
         let weakest = found.information.symmetric_eigenvalues().min();
         assert!(weakest < 1e-6 * found.information.trace(), "{}", found.information);
         assert!(found.pose.translation.vector.norm() < 1e-3);
+    }
+
+    #[test]
+    fn noise_does_not_show_where_along_bare_walls_a_scan_was_made() {
+        let corridor = walls(&[[0.0, 1.0, 0.0, -1.0], [0.0, -1.0, 0.0, 1.0]]);
+        // Normals are off by up to 0.4 radians, and each tenth point has none.
+        let noisy = |seed: usize| -> Vec<ScanPoint> {
+            let noise = |number: usize| ((number * 7919 + seed * 104_729) % 1000) as f64 / 1000.0 - 0.5;
+            let noisy = |(number, point): (usize, &ScanPoint)| {
+                let turn = UnitComplex::new(0.8 * noise(number));
+                let normal = point.normal.filter(|_| number % 10 != seed % 10).map(|normal| turn * normal);
+                ScanPoint { place: point.place + Vector2::y() * (0.06 * noise(number + 500)), normal }
+            };
+            corridor.iter().enumerate().map(noisy).collect()
+        };
+        let scans: Vec<Vec<ScanPoint>> = (0..10).map(noisy).collect();
+        let map = LocalMap::new(scans.iter().map(|scan| (Pose2::identity(), &scan[..])));
+        let found = map.find(&noisy(11), &Pose2::identity()).unwrap();
+        let position = found.information.fixed_view::<2, 2>(0, 0).symmetric_eigenvalues();
+        let [along, across] = [position.min(), position.max()].map(|information| information.sqrt().recip());
+        assert!(along > 4.0 * across && along > 0.08, "{along} {across}");
+        assert!(found.matched > 0.9, "points without a normal lie on the wall as well: {}", found.matched);
     }
 
     #[test]

@@ -136,17 +136,24 @@ mod tests {
         sides.chain(pillars).chain(cupboard).collect()
     }
 
-    /// What is found of a robot that has gone along the corridor, and comes back to a place in it after a way on which its
-    /// pose has become wrong by `off` metres along it, with a standard deviation of 2 m.
-    fn found(walls: &[ScanPoint], place: f64, off: f64) -> Option<Pose2> {
+    /// What a judge says of a robot that has gone along the corridor, and comes back to a place in it after a way on which its
+    /// pose has become wrong by `off` metres along it, with a standard deviation of 2 m. Then it sees other walls.
+    fn judged<T>(
+        walls: &[ScanPoint],
+        walls_again: &[ScanPoint],
+        place: f64,
+        off: f64,
+        judge: impl FnOnce(&Revisit<'_>, &[Candidate]) -> T,
+    ) -> T {
         let at = |step: usize| pose(0.4 * step as f64, 1.5, 0.0);
         let again = |step: usize| pose(place + 0.4 * step as f64, 1.5, 0.0);
         let truth: Vec<Pose2> = (0..150).map(at).chain((0..SUBMAP).map(again)).collect();
-        let seen = |truth: &Pose2| -> Vec<ScanPoint> {
+        let seen = |(scan, truth): (usize, &Pose2)| -> Vec<ScanPoint> {
+            let walls = if scan < 150 { walls } else { walls_again };
             let near = walls.iter().filter(|point| (point.place - truth.translation.vector).coords.norm() < 6.0);
             near.map(|point| ScanPoint { place: truth.inverse() * point.place, ..*point }).collect()
         };
-        let scans: Vec<Vec<ScanPoint>> = truth.iter().map(seen).collect();
+        let scans: Vec<Vec<ScanPoint>> = truth.iter().enumerate().map(seen).collect();
         let scans: Vec<&[ScanPoint]> = scans.iter().map(Vec::as_slice).collect();
         let mut graph = PoseGraph { poses: truth, ..Default::default() };
         graph.poses[150..].iter_mut().for_each(|pose| pose.translation.x += off);
@@ -156,16 +163,33 @@ mod tests {
         let covariance = Matrix3::from_diagonal(&Vector3::new(4.0, 0.04, 0.01));
         let candidates = revisit.candidates(|_| Some(covariance));
         assert!(candidates.iter().all(Candidate::is_uncertain));
-        find_place(&revisit, &candidates)
+        judge(&revisit, &candidates)
     }
 
     #[test]
     fn a_corridor_that_looks_alike_all_along_is_known_again_only_where_something_stands() {
         let walls = corridor(33.5);
         // The place nearest to where it seems to be that fits but for the cupboard is one pillar away.
-        let at = found(&walls, 30.0, 3.6).unwrap();
+        let at = judged(&walls, &walls, 30.0, 3.6, find_place).unwrap();
         let truth = 30.0 + 0.4 * 5.0;
         assert!((at.translation.x - truth).abs() < 0.1 && (at.translation.y - 1.5).abs() < 0.1, "{at}");
-        assert_eq!(found(&walls, 12.0, 3.6), None);
+        assert_eq!(judged(&walls, &walls, 12.0, 3.6, find_place), None);
+    }
+
+    #[test]
+    fn a_place_at_which_beams_pass_through_walls_is_another_one() {
+        let walls = corridor(33.5);
+        let wider = |point: &ScanPoint| {
+            let place = point.place + Vector2::y() * (point.place.y - 1.5).signum();
+            ScanPoint { place, ..*point }
+        };
+        let wider: Vec<ScanPoint> = walls.iter().map(wider).collect();
+        let is_contradicted = |again: &[ScanPoint]| {
+            judged(&walls, again, 30.0, 3.6, |revisit, candidates| {
+                is_contradicted(revisit, &[Point2::origin(); 160], &pose(32.0, 1.5, 0.0), candidates)
+            })
+        };
+        assert!(!is_contradicted(&walls));
+        assert!(is_contradicted(&wider));
     }
 }

@@ -286,7 +286,7 @@ fn tags_that_are_seen_again_close_a_loop_where_scans_show_nothing() {
 fn scans_are_straightened_by_a_recorded_map_which_stays_as_it_is() {
     let (walls, truth) = (walls(), drive());
     let half = &truth[truth.len() / 4..truth.len() * 3 / 4];
-    let mut open = driven(&walls, half, 2.0, 8);
+    let mut open = driven(&walls, half, 2.5, 8);
     let alone = error(open.poses(), half);
     // Points of the walls on both sides, in the frame of the building.
     let mut points = Vec::new();
