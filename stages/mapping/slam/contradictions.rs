@@ -29,7 +29,7 @@ const LEAST_BEAMS: usize = 8;
 /// and things that were moved are some of them, a wall that is drawn twice is most.
 const MAX_PASSING: f64 = 1.0 / 3.0;
 
-/// Share of the scans that see walls again from which a map of which they contradict it is wrong. The benchmark
+/// Largest share of the scans that see walls again, and contradict them, of a map that is right. The benchmark
 /// `scan_contradictions.py` fits it to simulated drives.
 pub const MAX_CONTRADICTING: f64 = 0.06;
 

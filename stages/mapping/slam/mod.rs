@@ -3,11 +3,12 @@
 //! Each scan is registered on the [`LocalMap`] of those around it: a correlative search over the uncertainty of
 //! odometry finds the basin (Olson 2009), and point-to-line registration the pose (Censi 2008). Scans are gathered in
 //! submaps of some metres. A finished submap is searched in each earlier one that may be at the same place, by branch
-//! and bound on a likelihood field; what fits, and fits nowhere else, becomes a loop closure. After a long way, when a pose is
-//! less certain than places that look alike are apart, the last metres are searched in all that may be there at once, and a
-//! place at which beams pass through walls is another one. Scans are the nodes of a pose graph, whose most likely poses are solved for after each closure, with a robust weight for closures. At the end
-//! each scan is registered on what was seen at its place at other times, by any of the robots whose relative poses are known
-//! ([`joint_poses`]), or on a [recorded map](recorded_map). Tags that are seen are landmarks of the graph.
+//! and bound on a likelihood field; what fits, and fits nowhere else, becomes a loop closure. After a long way, when a
+//! pose is less certain than places that look alike are apart, the last metres are searched in all that may be there at
+//! once, and a place at which beams pass through walls is another one. Scans are the nodes of a pose graph, whose most
+//! likely poses are solved for after each closure, with a robust weight for closures. At the end each scan is registered
+//! on what was seen at its place at other times, by any of the robots whose relative poses are known ([`joint_poses`]),
+//! or on a [recorded map](recorded_map). Tags that are seen are landmarks of the graph.
 //!
 //! The division into a local registration and submaps that are searched for loop closures by branch and bound is that
 //! of Cartographer (Hess et al. 2016, "Real-time loop closure in 2D LIDAR SLAM"); a local map of the last scans, and a
