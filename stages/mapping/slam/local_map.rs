@@ -24,6 +24,11 @@ const LEAST_STEP: f64 = 1e-4;
 /// Standard deviation in the weight of a match, as a share of the radius (Welsch).
 const WEIGHT_WIDTH: f64 = 0.5;
 
+/// Largest number of points without a normal within twice the last radius of one of them, as a multiple of those within it,
+/// for a corner: along a wall they are twice as many. And the least number of those within it.
+const MOST_SPREAD: f64 = 1.25;
+const LEAST_OF_CORNER: f64 = 5.0;
+
 /// A piece of a wall: the mean of the points of several scans.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Surface {
@@ -37,7 +42,7 @@ pub struct LocalMap {
     points: Vec<Point2>,
     surfaces: Vec<Surface>,
     index: PointIndex,
-    /// Points without a normal, away from walls: legs of tables, and clutter.
+    /// Points without a normal that are not along walls: legs of tables, corners of door frames, and clutter.
     spots: PointIndex,
 }
 
@@ -88,8 +93,10 @@ impl LocalMap {
         let places: Vec<Point2> = unsorted.iter().map(|surface| surface.place).collect();
         let (index, order) = PointIndex::new(&places, SURFACE_CELL);
         let surfaces = order.into_iter().map(|place| unsorted[place]).collect();
-        // What lies at a wall is part of it, or a corner of it: where along the wall it was seen is noise.
-        spots.retain(|spot| index.nearest(spot, LAST_RADIUS).is_none());
+        // What lies at a wall is part of it, and where along it it was seen is noise, but for the corners of door frames, which
+        // all scans see at the same place.
+        let (all_spots, _) = PointIndex::new(&spots, SURFACE_CELL);
+        spots.retain(|spot| index.nearest(spot, LAST_RADIUS).is_none() || is_corner(&all_spots, spot));
         let (spots, _) = PointIndex::new(&spots, SURFACE_CELL);
         Self { points, surfaces, index, spots }
     }
@@ -234,6 +241,12 @@ impl<'a> MovingScan<'a> {
         let matched = f64::from(matched) / self.scan.len().max(1) as f64;
         MoveEquations { matrix, vector, information, matched }
     }
+}
+
+/// Whether the points without a normal about one of them lie at one place, and not along a wall.
+fn is_corner(spots: &PointIndex, spot: &Point2) -> bool {
+    let [near, wide] = [LAST_RADIUS, 2.0 * LAST_RADIUS].map(|radius| spots.within(spot, radius).count() as f64);
+    wide < MOST_SPREAD * near && near >= LEAST_OF_CORNER
 }
 
 /// The symmetric matrix without negative eigenvalues that is nearest to one (Higham 1988, "Computing a nearest symmetric
