@@ -9,74 +9,12 @@ is off by 5 % of the way (standard deviation of each step) and 3 % of the turn. 
 import argparse
 
 import numpy as np
-from mcap_ros2.writer import Writer
+from robot_log import RobotLog
 
 HALF_WIDTH, START, END = 1.1, -5.0, 85.0
 DOOR_DEPTH, DOOR_WIDTH = 0.12, 0.9
 WAY, SPEED, RATE = 75.0, 0.6, 10.0
 NOISE, WAY_NOISE, TURN_NOISE = 0.01, 0.05, 0.03
-SEPARATOR = "=" * 80
-HEADER = f"""{SEPARATOR}
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-{SEPARATOR}
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-"""
-SCAN = f"""std_msgs/Header header
-float32 angle_min
-float32 angle_max
-float32 angle_increment
-float32 time_increment
-float32 scan_time
-float32 range_min
-float32 range_max
-float32[] ranges
-float32[] intensities
-{HEADER}"""
-POSE = f"""{SEPARATOR}
-MSG: geometry_msgs/Pose
-geometry_msgs/Point position
-geometry_msgs/Quaternion orientation
-{SEPARATOR}
-MSG: geometry_msgs/Point
-float64 x
-float64 y
-float64 z
-{SEPARATOR}
-MSG: geometry_msgs/Quaternion
-float64 x
-float64 y
-float64 z
-float64 w
-"""
-POSE_STAMPED = f"""std_msgs/Header header
-geometry_msgs/Pose pose
-{HEADER}{POSE}"""
-ODOMETRY = f"""std_msgs/Header header
-string child_frame_id
-geometry_msgs/PoseWithCovariance pose
-geometry_msgs/TwistWithCovariance twist
-{HEADER}{POSE}{SEPARATOR}
-MSG: geometry_msgs/PoseWithCovariance
-geometry_msgs/Pose pose
-float64[36] covariance
-{SEPARATOR}
-MSG: geometry_msgs/TwistWithCovariance
-geometry_msgs/Twist twist
-float64[36] covariance
-{SEPARATOR}
-MSG: geometry_msgs/Twist
-geometry_msgs/Vector3 linear
-geometry_msgs/Vector3 angular
-{SEPARATOR}
-MSG: geometry_msgs/Vector3
-float64 x
-float64 y
-float64 z
-"""
 
 
 def walls(has_doors, random):
@@ -104,12 +42,6 @@ def cast(segments, place, angles):
     return np.where((distance > 0) & (share >= 0) & (share <= 1), distance, np.inf).min(1)
 
 
-def pose_message(x, y, yaw):
-    """The message of a pose in the plane."""
-    orientation = {"x": 0.0, "y": 0.0, "z": np.sin(yaw / 2), "w": np.cos(yaw / 2)}
-    return {"position": {"x": x, "y": y, "z": 0.0}, "orientation": orientation}
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("output")
@@ -125,14 +57,8 @@ def main():
     odometry = np.zeros(3)
     before = None
     with open(arguments.output, "wb") as target:
-        writer = Writer(target)
-        scans = writer.register_msgdef("sensor_msgs/msg/LaserScan", SCAN)
-        poses = writer.register_msgdef("geometry_msgs/msg/PoseStamped", POSE_STAMPED)
-        odometries = writer.register_msgdef("nav_msgs/msg/Odometry", ODOMETRY)
-        still = {"linear": {"x": 0.0, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}
+        log = RobotLog(target, RATE, angles, arguments.range)
         for number in range(int(WAY / SPEED * RATE)):
-            time = 1_700_000_000 * 10**9 + int(number / RATE * 1e9)
-            stamp = {"sec": time // 10**9, "nanosec": time % 10**9}
             pose = np.array([number / RATE * SPEED, 0.15 * np.sin(0.05 * number), 0.08 * np.sin(0.05 * number + 1)])
             if before is not None:
                 moved = pose - before
@@ -140,32 +66,9 @@ def main():
                 heading = np.arctan2(moved[1], moved[0]) - before[2] + odometry[2]
                 odometry += [way * np.cos(heading), way * np.sin(heading), moved[2] * (1 + TURN_NOISE * random.standard_normal())]
             before = pose
-            message = {"header": {"stamp": stamp, "frame_id": "building"}, "pose": pose_message(*pose)}
-            writer.write_message("/robot1/truth", poses, message, time, time)
-            if arguments.odometry:
-                message = {
-                    "header": {"stamp": stamp, "frame_id": "robot1/odom"},
-                    "child_frame_id": "robot1/base_link",
-                    "pose": {"pose": pose_message(*odometry), "covariance": [0.0] * 36},
-                    "twist": {"twist": still, "covariance": [0.0] * 36},
-                }
-                writer.write_message("/robot1/odom", odometries, message, time, time)
             ranges = cast(segments, pose, angles + pose[2]) + NOISE * random.standard_normal(arguments.beams)
-            ranges[ranges > arguments.range] = np.inf
-            message = {
-                "header": {"stamp": stamp, "frame_id": "robot1/base_link"},
-                "angle_min": angles[0],
-                "angle_max": angles[-1],
-                "angle_increment": step,
-                "time_increment": 0.0,
-                "scan_time": 1 / RATE,
-                "range_min": 0.05,
-                "range_max": arguments.range,
-                "ranges": ranges.tolist(),
-                "intensities": [],
-            }
-            writer.write_message("/robot1/scan", scans, message, time, time)
-        writer.finish()
+            log.write(pose, odometry if arguments.odometry else None, ranges)
+        log.finish()
 
 
 if __name__ == "__main__":

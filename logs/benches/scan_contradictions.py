@@ -15,31 +15,10 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-import numpy as np
+from trajectory_error import distances, poses, rms
 
 WRONG = 0.5
 COUNTS = ("scans that contradict walls", "scans that see walls again")
-
-
-def poses(gridweave, log, topic):
-    """Positions by time in nanoseconds."""
-    lines = subprocess.run([gridweave, "cat", log, "--topics", topic], capture_output=True, text=True).stdout.splitlines()
-    found = {}
-    for message in (json.loads(line)["message"] for line in lines):
-        stamp, pose = message["header"]["stamp"], message["pose"]
-        position = pose.get("pose", pose)["position"]
-        found[stamp["sec"] * 10**9 + stamp["nanosec"]] = (position["x"], position["y"])
-    return found
-
-
-def error(estimated, truth):
-    """Root of the mean squared distance after rigid alignment, metres."""
-    times = sorted(set(estimated) & set(truth))
-    a, b = (np.array([track[time] for time in times]) for track in (estimated, truth))
-    a, b = a - a.mean(0), b - b.mean(0)
-    u, _, vt = np.linalg.svd(a.T @ b)
-    rotation = vt.T @ np.diag([1, np.sign(np.linalg.det(vt.T @ u.T))]) @ u.T
-    return float(np.sqrt(((a @ rotation.T - b) ** 2).sum(1).mean()))
 
 
 def drive(gridweave, seed, folder):
@@ -64,7 +43,7 @@ def drive(gridweave, seed, folder):
     estimated = poses(gridweave, merged, "/robot1/matched_pose")
     if revisiting == 0 or len(estimated) < 3:
         return None
-    off, share = error(estimated, poses(gridweave, world, "/robot1/pose")), contradicting / revisiting
+    off, share = rms(distances(estimated, poses(gridweave, world, "/robot1/pose"))), contradicting / revisiting
     print(seed, *lidar, *slips, "odometry" if has_odometry else "scans alone", f"{off:.3f} m {share:.3f}", flush=True)
     return off, share
 

@@ -15,9 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from corridor_scans import ODOMETRY, POSE_STAMPED, SCAN, pose_message
-from mcap_ros2.writer import Writer
 from PIL import Image
+from robot_log import RobotLog
 from scipy import ndimage
 
 # Side of the cells in which ways are planned, and the distance that a robot keeps from what is not free, metres.
@@ -163,41 +162,13 @@ def main():
     view = math.radians(arguments.field_of_view)
     step = view / (arguments.beams if arguments.field_of_view >= 360 else arguments.beams - 1)
     angles = -view / 2 + step * np.arange(arguments.beams)
-    still = {"linear": {"x": 0.0, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}
     with open(arguments.output, "wb") as target:
-        writer = Writer(target)
-        scans = writer.register_msgdef("sensor_msgs/msg/LaserScan", SCAN)
-        truths = writer.register_msgdef("geometry_msgs/msg/PoseStamped", POSE_STAMPED)
-        odometries = writer.register_msgdef("nav_msgs/msg/Odometry", ODOMETRY)
-        for number, (pose, by_wheels) in enumerate(zip(poses, odometry(poses, random))):
-            time = 1_700_000_000 * 10**9 + int(number / RATE * 1e9)
-            stamp = {"sec": time // 10**9, "nanosec": time % 10**9}
-            truth = {"header": {"stamp": stamp, "frame_id": "building"}, "pose": pose_message(*pose)}
-            writer.write_message("/robot1/truth", truths, truth, time, time)
-            if not arguments.alone:
-                message = {
-                    "header": {"stamp": stamp, "frame_id": "robot1/odom"},
-                    "child_frame_id": "robot1/base_link",
-                    "pose": {"pose": pose_message(*by_wheels), "covariance": [0.0] * 36},
-                    "twist": {"twist": still, "covariance": [0.0] * 36},
-                }
-                writer.write_message("/robot1/odom", odometries, message, time, time)
+        log = RobotLog(target, RATE, angles, arguments.range)
+        for pose, by_wheels in zip(poses, odometry(poses, random)):
             ranges = cast(distances, resolution, pose, angles, arguments.range) + RANGE_NOISE * random.standard_normal(len(angles))
-            ranges[(ranges > arguments.range) | (random.random(len(angles)) < MISSING)] = np.inf
-            message = {
-                "header": {"stamp": stamp, "frame_id": "robot1/base_link"},
-                "angle_min": angles[0],
-                "angle_max": angles[-1],
-                "angle_increment": step,
-                "time_increment": 0.0,
-                "scan_time": 1 / RATE,
-                "range_min": 0.05,
-                "range_max": arguments.range,
-                "ranges": ranges.tolist(),
-                "intensities": [],
-            }
-            writer.write_message("/robot1/scan", scans, message, time, time)
-        writer.finish()
+            ranges[random.random(len(angles)) < MISSING] = np.inf
+            log.write(pose, None if arguments.alone else by_wheels, ranges)
+        log.finish()
 
 
 if __name__ == "__main__":

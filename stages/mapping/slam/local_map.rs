@@ -2,61 +2,35 @@
 
 use super::correlative_search::PosePrior;
 use super::likelihood_field::LikelihoodField;
-use super::scan_points::{SPACING, ScanPoint};
-use crate::shared::geometry::{MovingLookup, Point2, PointIndex, Pose2, quarter_turn};
-use crate::shared::walls::{CORRELATION_LENGTH, DEVIATION, LEAST_NORMAL_AGREEMENT};
-use nalgebra::{Matrix3, Vector2, Vector3};
+use super::scan_points::ScanPoint;
+use crate::shared::geometry::{Point2, PointIndex, Pose2};
+use nalgebra::Vector2;
 
 /// Side of the cells in which points of one direction are averaged, metres.
 const SURFACE_CELL: f64 = 0.1;
-/// Distances within which a point is matched with a surface, metres: from the search's cells down to the noise.
-const RADII: [f64; 7] = [0.3, 0.25, 0.2, LAST_RADIUS, LAST_RADIUS, LAST_RADIUS, LAST_RADIUS];
-const LAST_RADIUS: f64 = 0.15;
-/// Least share of the points of a scan, or of a submap, that lie on a map of which it has seen enough to be registered.
-const LEAST_MATCHED: f64 = 0.5;
-/// Every which point is looked up before all are, and the least share of these that has a wall within the first radius
-/// of the guess: of all points it is at least that in all but 3 of 125,000 registrations of five public and simulated logs
-/// with [`LEAST_MATCHED`] at the end.
-const SAMPLE: usize = 4;
-const LEAST_MATCHED_AT_GUESS: f64 = 0.3;
-/// Steps at the last radius that are shorter end the iteration, metres and radians.
-const LEAST_STEP: f64 = 1e-4;
-/// Standard deviation in the weight of a match, as a share of the radius (Welsch).
-const WEIGHT_WIDTH: f64 = 0.5;
-
-/// Largest number of points without a normal within twice the last radius of one of them, as a multiple of those within it,
-/// for a corner: along a wall they are twice as many. And the least number of those within it.
+/// Distance of a point without a normal from a wall up to which it is part of it, metres.
+const AT_WALL: f64 = 0.15;
+/// Largest number of points without a normal within twice that distance of one of them, as a multiple of those within it, for a
+/// corner: along a wall they are twice as many. And the least number of those within it.
 const MOST_SPREAD: f64 = 1.25;
 const LEAST_OF_CORNER: f64 = 5.0;
 
 /// A piece of a wall: the mean of the points of several scans.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Surface {
-    place: Point2,
-    normal: Vector2<f64>,
+pub(super) struct Surface {
+    pub(super) place: Point2,
+    pub(super) normal: Vector2<f64>,
 }
 
 /// The points of several scans in one frame.
 #[derive(Clone, Debug)]
 pub struct LocalMap {
     points: Vec<Point2>,
-    surfaces: Vec<Surface>,
-    index: PointIndex,
+    /// Pieces of walls, in the order of `index`.
+    pub(super) surfaces: Vec<Surface>,
+    pub(super) index: PointIndex,
     /// Points without a normal that are not along walls: legs of tables, corners of door frames, and clutter.
-    spots: PointIndex,
-}
-
-/// Registration of points on a local map.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Match {
-    /// Pose of the points' frame in the map's.
-    pub pose: Pose2,
-    /// Inverse of the covariance of (x, y, yaw) in the map's frame by the matches alone. Each match counts by the product of
-    /// the normals of the wall and of the point, whose errors are independent: the square of one alone would grow with its
-    /// noise, as if a bare wall showed where along it the points are.
-    pub information: Matrix3<f64>,
-    /// Share of the points that lie on the map: those with a normal on a surface of the same direction.
-    pub matched: f64,
+    pub(super) spots: PointIndex,
 }
 
 impl LocalMap {
@@ -96,7 +70,7 @@ impl LocalMap {
         // What lies at a wall is part of it, and where along it it was seen is noise, but for the corners of door frames, which
         // all scans see at the same place.
         let (all_spots, _) = PointIndex::new(&spots, SURFACE_CELL);
-        spots.retain(|spot| index.nearest(spot, LAST_RADIUS).is_none() || is_corner(&all_spots, spot));
+        spots.retain(|spot| index.nearest(spot, AT_WALL).is_none() || is_corner(&all_spots, spot));
         let (spots, _) = PointIndex::new(&spots, SURFACE_CELL);
         Self { points, surfaces, index, spots }
     }
@@ -106,155 +80,12 @@ impl LocalMap {
         let [x, y, _] = prior.window;
         LikelihoodField::new(self.points.iter().copied(), &prior.reach(points), x.max(y))
     }
-
-    /// Registers points on the walls: the distances of the points to the lines of the surfaces are minimised together
-    /// with the deviation from a prior, with weights that fall with the distance (point to line as in Censi 2008, "An
-    /// ICP variant using a point-to-line metric").
-    pub fn register(&self, scan: &[ScanPoint], guess: &Pose2, prior: (&Pose2, &Matrix3<f64>)) -> Match {
-        let mut moving = MovingScan::new(self, scan, guess, Some(prior));
-        let equations = moving.equations(RADII[0]);
-        moving.run(equations)
-    }
-
-    /// Registers points by the walls alone. `None` if fewer than [`LEAST_MATCHED`] of them lie on the map. Most scans
-    /// share little with the map, which a part of their points at the guess shows.
-    pub(super) fn find(&self, scan: &[ScanPoint], guess: &Pose2) -> Option<Match> {
-        let sample: Vec<ScanPoint> = scan.iter().step_by(SAMPLE).copied().collect();
-        let at_guess = MovingScan::new(self, &sample, guess, None).equations(RADII[0]);
-        if at_guess.matched < LEAST_MATCHED_AT_GUESS {
-            return None;
-        }
-        let mut moving = MovingScan::new(self, scan, guess, None);
-        let equations = moving.equations(RADII[0]);
-        let found = moving.run(equations);
-        (found.matched >= LEAST_MATCHED).then_some(found)
-    }
-}
-
-/// A scan on its way to its place on a map.
-struct MovingScan<'a> {
-    map: &'a LocalMap,
-    scan: &'a [ScanPoint],
-    pose: Pose2,
-    prior: Option<(&'a Pose2, &'a Matrix3<f64>)>,
-    /// For each point the lookup of its nearest wall or spot.
-    lookups: Vec<MovingLookup>,
-}
-
-/// Normal equations of a small move (x, y, yaw about the points' frame).
-struct MoveEquations {
-    matrix: Matrix3<f64>,
-    vector: Vector3<f64>,
-    /// The matrix with the points' own normals on one side.
-    information: Matrix3<f64>,
-    /// Share of the points that lie on the map.
-    matched: f64,
-}
-
-impl<'a> MovingScan<'a> {
-    fn new(
-        map: &'a LocalMap,
-        scan: &'a [ScanPoint],
-        guess: &Pose2,
-        prior: Option<(&'a Pose2, &'a Matrix3<f64>)>,
-    ) -> Self {
-        Self { map, scan, pose: *guess, prior, lookups: vec![MovingLookup::default(); scan.len()] }
-    }
-
-    /// Moves the points to where the equations and those after them say, the first of which are within `RADII[0]`.
-    fn run(mut self, mut equations: MoveEquations) -> Match {
-        for radii in RADII.windows(2) {
-            let Some(step) = self.step(&equations) else { break };
-            self.pose.translation.vector += step.xy();
-            self.pose.rotation *= nalgebra::UnitComplex::new(step.z);
-            equations = self.equations(radii[1]);
-            if radii[0] == LAST_RADIUS && step.norm() < LEAST_STEP {
-                break;
-            }
-        }
-        Match { pose: self.pose, information: positive_part(&equations.information), matched: equations.matched }
-    }
-
-    /// The move that fits the equations and the prior best.
-    fn step(&self, equations: &MoveEquations) -> Option<Vector3<f64>> {
-        let MoveEquations { mut matrix, mut vector, .. } = *equations;
-        if let Some((mean, information)) = self.prior {
-            let off = Vector3::new(
-                mean.translation.x - self.pose.translation.x,
-                mean.translation.y - self.pose.translation.y,
-                (mean.rotation / self.pose.rotation).angle(),
-            );
-            matrix += information;
-            vector += information * off;
-        }
-        // Nothing else fixes what no wall does.
-        matrix += Matrix3::identity();
-        Some(matrix.cholesky()?.solve(&vector))
-    }
-
-    /// The equations by the points that have a wall or a spot within `radius`.
-    fn equations(&mut self, radius: f64) -> MoveEquations {
-        let (map, pose) = (self.map, &self.pose);
-        let (mut matrix, mut vector, mut information) = (Matrix3::zeros(), Vector3::zeros(), Matrix3::zeros());
-        let mut matched = 0;
-        // Neighbouring points of a wall are one measurement.
-        let of_point = SPACING / CORRELATION_LENGTH / (DEVIATION * DEVIATION);
-        let width = WEIGHT_WIDTH * radius;
-        let weight = |squared_distance: f64| of_point * (-0.5 * squared_distance / (width * width)).exp();
-        let mut before = usize::MAX;
-        for (point, lookup) in self.scan.iter().zip(&mut self.lookups) {
-            let arm = pose.rotation * point.place.coords;
-            let place = pose.translation.vector + arm;
-            let row = |by: &Vector2<f64>| Vector3::new(by.x, by.y, by.dot(&quarter_turn(&arm)));
-            let index = if point.normal.is_some() { &map.index } else { &map.spots };
-            let found = lookup.nearest(index, &place.into(), radius, before).map(|found| found.index);
-            before = found.unwrap_or(before);
-            let normal = point.normal.map(|normal| pose.rotation * normal);
-            let surface = match (normal, found) {
-                (None, Some(spot)) => {
-                    matched += 1;
-                    let off = map.spots.points()[spot].coords - place;
-                    let weight = weight(off.norm_squared());
-                    for row in [row(&Vector2::x()), row(&Vector2::y())] {
-                        matrix += weight * row * row.transpose();
-                        information += weight * row * row.transpose();
-                    }
-                    vector += weight * (row(&Vector2::x()) * off.x + row(&Vector2::y()) * off.y);
-                    continue;
-                }
-                (None, None) => map.index.nearest(&place.into(), radius).map(|found| found.index),
-                (Some(_), found) => found,
-            };
-            let Some(surface) = surface.map(|surface| &map.surfaces[surface]) else { continue };
-            if normal.is_some_and(|normal| surface.normal.dot(&normal) < LEAST_NORMAL_AGREEMENT) {
-                continue;
-            }
-            matched += 1;
-            let off = surface.normal.dot(&(surface.place.coords - place));
-            let by_wall = weight(off * off) * row(&surface.normal);
-            matrix += by_wall * row(&surface.normal).transpose();
-            vector += by_wall * off;
-            if let Some(normal) = normal {
-                information += by_wall * row(&normal).transpose();
-            }
-        }
-        let matched = f64::from(matched) / self.scan.len().max(1) as f64;
-        MoveEquations { matrix, vector, information, matched }
-    }
 }
 
 /// Whether the points without a normal about one of them lie at one place, and not along a wall.
 fn is_corner(spots: &PointIndex, spot: &Point2) -> bool {
-    let [near, wide] = [LAST_RADIUS, 2.0 * LAST_RADIUS].map(|radius| spots.within(spot, radius).count() as f64);
+    let [near, wide] = [AT_WALL, 2.0 * AT_WALL].map(|radius| spots.within(spot, radius).count() as f64);
     wide < MOST_SPREAD * near && near >= LEAST_OF_CORNER
-}
-
-/// The symmetric matrix without negative eigenvalues that is nearest to one (Higham 1988, "Computing a nearest symmetric
-/// positive semidefinite matrix").
-fn positive_part(matrix: &Matrix3<f64>) -> Matrix3<f64> {
-    let mut eigen = (0.5 * (matrix + matrix.transpose())).symmetric_eigen();
-    eigen.eigenvalues = eigen.eigenvalues.map(|value| value.max(0.0));
-    eigen.recompose()
 }
 
 /// The cell of a place and the sector of a direction, as one number.
@@ -283,29 +114,6 @@ fn sector(direction: &Vector2<f64>) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shared::geometry::pose;
-    use nalgebra::UnitComplex;
-
-    /// Walls with their normals, as seen from the inside of a room of 6 by 4 metres.
-    fn walls(sides: &[[f64; 4]]) -> Vec<ScanPoint> {
-        let mut points = Vec::new();
-        for &[x, y, normal_x, normal_y] in sides {
-            let along = Vector2::new(-normal_y, normal_x);
-            for step in -20..=20 {
-                let place = Point2::new(x, y) + along * (SPACING * f64::from(step));
-                points.push(ScanPoint { place, normal: Some(Vector2::new(normal_x, normal_y)) });
-            }
-        }
-        points
-    }
-
-    fn seen_from(pose: &Pose2, points: &[ScanPoint]) -> Vec<ScanPoint> {
-        let into = pose.inverse();
-        points
-            .iter()
-            .map(|point| ScanPoint { place: into * point.place, normal: point.normal.map(|normal| into * normal) })
-            .collect()
-    }
 
     #[test]
     fn sectors_follow_each_other_around_the_circle() {
@@ -314,52 +122,5 @@ mod tests {
             let direction = nalgebra::Rotation2::new(angle.to_radians()) * -Vector2::x();
             assert_eq!(sector(&direction), (angle / 30.0) as u64, "{angle}");
         }
-    }
-
-    #[test]
-    fn points_are_registered_to_a_millimetre_and_only_where_walls_say_so() {
-        let room = walls(&[[3.0, 0.0, -1.0, 0.0], [-3.0, 0.0, 1.0, 0.0], [0.0, 2.0, 0.0, -1.0]]);
-        let map = LocalMap::new([(Pose2::identity(), &room[..])].into_iter());
-        let truth = pose(0.11, -0.07, 0.03);
-        let found = map.find(&seen_from(&truth, &room), &Pose2::identity()).unwrap();
-        let off = truth.inverse() * found.pose;
-        assert!(off.translation.vector.norm() < 1e-3 && off.rotation.angle().abs() < 1e-3, "{off}");
-        assert!(found.matched > 0.95);
-
-        // A corridor: nothing tells where along it.
-        let corridor = walls(&[[0.0, 1.0, 0.0, -1.0], [0.0, -1.0, 0.0, 1.0]]);
-        let map = LocalMap::new([(Pose2::identity(), &corridor[..])].into_iter());
-        let found = map.find(&corridor, &pose(0.0, 0.05, 0.0)).unwrap();
-        let weakest = found.information.symmetric_eigenvalues().min();
-        assert!(weakest < 1e-6 * found.information.trace(), "{}", found.information);
-        assert!(found.pose.translation.vector.norm() < 1e-3);
-    }
-
-    #[test]
-    fn noise_does_not_show_where_along_bare_walls_a_scan_was_made() {
-        let corridor = walls(&[[0.0, 1.0, 0.0, -1.0], [0.0, -1.0, 0.0, 1.0]]);
-        // Normals are off by up to 0.4 radians, and each tenth point has none.
-        let noisy = |seed: usize| -> Vec<ScanPoint> {
-            let noise = |number: usize| ((number * 7919 + seed * 104_729) % 1000) as f64 / 1000.0 - 0.5;
-            let noisy = |(number, point): (usize, &ScanPoint)| {
-                let turn = UnitComplex::new(0.8 * noise(number));
-                let normal = point.normal.filter(|_| number % 10 != seed % 10).map(|normal| turn * normal);
-                ScanPoint { place: point.place + Vector2::y() * (0.06 * noise(number + 500)), normal }
-            };
-            corridor.iter().enumerate().map(noisy).collect()
-        };
-        let scans: Vec<Vec<ScanPoint>> = (0..10).map(noisy).collect();
-        let map = LocalMap::new(scans.iter().map(|scan| (Pose2::identity(), &scan[..])));
-        let found = map.find(&noisy(11), &Pose2::identity()).unwrap();
-        let position = found.information.fixed_view::<2, 2>(0, 0).symmetric_eigenvalues();
-        let [along, across] = [position.min(), position.max()].map(|information| information.sqrt().recip());
-        assert!(along > 4.0 * across && along > 0.08, "{along} {across}");
-        assert!(found.matched > 0.9, "points without a normal lie on the wall as well: {}", found.matched);
-    }
-
-    #[test]
-    fn the_other_face_of_a_wall_is_not_matched() {
-        let map = LocalMap::new([(Pose2::identity(), &walls(&[[1.0, 0.0, -1.0, 0.0]])[..])].into_iter());
-        assert_eq!(map.find(&walls(&[[1.05, 0.0, 1.0, 0.0]]), &Pose2::identity()), None);
     }
 }

@@ -23,6 +23,7 @@ mod likelihood_field;
 mod local_map;
 mod loop_closure;
 mod odometry_noise;
+mod point_to_line;
 mod pose_graph;
 mod recorded_map;
 mod relocalization;

@@ -87,17 +87,13 @@ fn kind(hits: &[Point2], index: usize, lidar: &Point2) -> HitKind {
             None => HitKind::Spot,
         };
     }
+    let (Some(before), Some(after)) = (before, after) else { return HitKind::Grazed };
+    // Asked first, as the hit of a straight wall that is nearest to the lidar has both others behind it, as a pole has.
+    if is_between(&at, before, after) {
+        return normal(&at, [before, after].into_iter(), lidar).map_or(HitKind::Grazed, HitKind::Wall);
+    }
     let range = (at - lidar).norm();
-    let is_behind = |other: Option<&Point2>| other.is_some_and(|other| (other - lidar).norm() > range);
-    if is_behind(before) && is_behind(after) {
-        return HitKind::Spot;
-    }
-    match (before, after) {
-        (Some(before), Some(after)) if is_between(&at, before, after) => {
-            normal(&at, [before, after].into_iter(), lidar).map_or(HitKind::Grazed, HitKind::Wall)
-        }
-        _ => HitKind::Grazed,
-    }
+    if [before, after].iter().all(|other| (*other - lidar).norm() > range) { HitKind::Spot } else { HitKind::Grazed }
 }
 
 /// Whether a point lies on the line between two others.
@@ -164,6 +160,9 @@ mod tests {
         let wall = hits(&[(6.0, 1.0), (7.0, 1.01), (8.5, 1.0), (11.0, 1.0)]);
         assert!(wall.iter().all(|point| point.normal.is_some_and(|normal| normal.y < -0.99)), "{wall:?}");
         assert_eq!(wall.iter().map(|point| point.place.x).collect::<Vec<_>>(), [7.0, 8.5]);
+        // The hit nearest to the lidar, before both others, is on the wall as well.
+        let nearest = hits(&[(-1.0, 1.0), (0.0, 1.005), (1.0, 1.0)]);
+        assert!(nearest.len() == 1 && nearest[0].normal.is_some_and(|normal| normal.y < -0.99), "{nearest:?}");
         // The leg of a table in front of it, and a hit in an open door, which goes along with the lidar.
         let leg = hits(&[(6.0, 1.0), (5.0, 0.7), (8.5, 1.0)]);
         assert_eq!((leg.len(), leg[0]), (1, ScanPoint { place: Point2::new(5.0, 0.7), normal: None }));
