@@ -78,7 +78,7 @@ def corrected(path):
 def shown(name, errors, whole=1.0):
     if errors is None:
         return f"| {name} | no map |"
-    share = "" if whole == 1 else f" | {whole:.0%} of the scans"
+    share = "" if whole > 0.995 else f" | {whole:.0%} of the scans"
     return f"| {name} | {rms(errors):.3f} | {np.median(errors):.3f} | {errors.max():.2f}{share} |"
 
 
