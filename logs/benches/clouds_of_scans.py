@@ -13,11 +13,11 @@ import numpy as np
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer
+from robot_log import HEADER, SEPARATOR
 
 LIDAR_HEIGHT = 0.5
 CEILING_HEIGHT = 2.5
 NOISE = 0.01
-SEPARATOR = "=" * 80
 CLOUD = f"""std_msgs/Header header
 uint32 height
 uint32 width
@@ -27,15 +27,7 @@ uint32 point_step
 uint32 row_step
 uint8[] data
 bool is_dense
-{SEPARATOR}
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-{SEPARATOR}
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-{SEPARATOR}
+{HEADER}{SEPARATOR}
 MSG: sensor_msgs/PointField
 string name
 uint32 offset
