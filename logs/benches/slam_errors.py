@@ -35,6 +35,8 @@ CORRIDORS = [("bare, by scans alone", ""), ("with door frames, by scans alone", 
 PARTS = ["alone", "together", "simulated", "pairs", "corridors"]
 # Two robots have met where they are nearer to each other than this, metres.
 MEETING = 1.0
+# The exit status of a run in which a robot could not be merged.
+UNMERGED = 3
 
 
 class Bench:
@@ -47,9 +49,9 @@ class Bench:
         return str(self.folder / name)
 
     def run(self, *arguments):
-        """Runs a command. A robot may have no map, and then no poses either; whatever else fails ends the measurement."""
+        """Runs a command. A robot may have no map, or not be merged; whatever else fails ends the measurement."""
         done = subprocess.run([self.gridweave, *map(str, arguments)], capture_output=True, text=True)
-        if done.returncode != 0 and "no usable map" not in done.stderr:
+        if done.returncode not in (0, UNMERGED) and "no usable map" not in done.stderr:
             sys.exit(f"`gridweave {' '.join(map(str, arguments))}` failed:\n{done.stderr}")
 
     def errors(self, log, truths, robot="robot1"):
