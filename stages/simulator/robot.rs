@@ -45,6 +45,14 @@ pub struct RobotLog {
     pub maps: Vec<(usize, SnapshotMap)>,
 }
 
+impl RobotLog {
+    /// The hits of the scan at a tick, in the frame of the robot and the order of the beams; none if scans are not logged.
+    pub fn hits(&self, tick: usize) -> Vec<Point2> {
+        let hit = |beam: &Beam| Point2::new(beam.range * beam.angle.cos(), beam.range * beam.angle.sin());
+        self.scans.get(tick).map_or_else(Vec::new, |beams| beams.iter().map(hit).collect())
+    }
+}
+
 /// Simulates the drive of one robot through its rooms, its map and its tag readings.
 pub(super) fn simulate_robot(
     world: &World,

@@ -19,6 +19,7 @@ mod map_pairs;
 mod methods;
 mod noise;
 mod plot;
+mod pose_certainty;
 mod processor_time;
 mod radon;
 mod results;
@@ -53,6 +54,8 @@ enum Experiment {
     FewTags(few_tags::FewTagsArgs),
     /// Robots without maps whose odometry drifts, merged by the tags that they read.
     TagSlam(tag_slam::TagSlamArgs),
+    /// Whether the poses of SLAM are as certain as its pose graph says.
+    PoseCertainty(pose_certainty::PoseCertaintyArgs),
     /// Merging pairs of map files by the maps alone: pairs with a truth, and thousands of different buildings.
     MapPairs(map_pairs::MapPairsArgs),
     /// Fits the weights of the judgement to pairs of maps, cross-validated by place, and writes them.
@@ -77,6 +80,7 @@ fn main() -> Result<()> {
         Experiment::Localization(args) => localization::run(args, &mut results),
         Experiment::FewTags(args) => few_tags::run(args, &registry, &mut results),
         Experiment::TagSlam(args) => tag_slam::run(args, &registry, &mut results),
+        Experiment::PoseCertainty(args) => pose_certainty::run(args, &mut results),
         Experiment::MapPairs(args) => map_pairs::run(args, &registry, &mut results),
         Experiment::FitJudgement(args) => judgement::run(args, &registry, &mut results),
         Experiment::Radon(args) => radon::run(args, &mut results),

@@ -100,9 +100,9 @@ impl<'a> JointTrajectories<'a> {
     /// Adds the tags that a robot saw, whose scans are those from the given one on.
     fn add_sightings(&mut self, trajectory: &'a Trajectory, first: usize) {
         let mut numbers = vec![0; trajectory.tags().len()];
-        for (tag, seen) in trajectory.tags() {
+        for (tag, landmark) in trajectory.tags() {
             let next = self.landmarks.len();
-            numbers[seen.landmark] = *self.landmarks.entry(tag).or_insert(next);
+            numbers[landmark] = *self.landmarks.entry(tag).or_insert(next);
         }
         let sightings = trajectory.sightings().iter();
         self.graph.sightings.extend(sightings.map(|own| LandmarkSighting {
@@ -123,7 +123,7 @@ impl<'a> JointTrajectories<'a> {
             let revisit =
                 Revisit { graph: &self.graph, scans: &self.scans, submaps: &submaps, drives: &self.drives, recent };
             let pose = self.graph.poses[middle(submap)];
-            find_closures(&revisit, &pose, &revisit.candidates(|_| Some(covariance)))
+            find_closures(&revisit, &pose, &revisit.candidates(|_| covariance))
         };
         own.par_iter().flat_map_iter(of_submap).collect()
     }

@@ -96,8 +96,8 @@ pub(super) fn middle(scans: &Range<usize>) -> usize {
 
 impl Revisit<'_> {
     /// The earlier submaps that may be where the last one is, the nearest first. `covariance` gives that of a scan in the
-    /// frame of the last submap; none if it is not known.
-    pub(super) fn candidates(&self, covariance: impl Fn(usize) -> Option<Matrix3<f64>>) -> Vec<Candidate> {
+    /// frame of the last submap.
+    pub(super) fn candidates(&self, covariance: impl Fn(usize) -> Matrix3<f64>) -> Vec<Candidate> {
         let Some((own, earlier)) = self.submaps.split_last() else { return Vec::new() };
         let poses = &self.graph.poses;
         let distance = |other: &Range<usize>| {
@@ -109,7 +109,7 @@ impl Revisit<'_> {
             .collect();
         apart.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let may_be_there = |(distance, submap): (f64, usize)| {
-            let candidate = Candidate { submap, covariance: covariance(middle(&earlier[submap]))? };
+            let candidate = Candidate { submap, covariance: covariance(middle(&earlier[submap])) };
             (distance <= COMMON_DISTANCE + 2.0 * candidate.deviations()[0]).then_some(candidate)
         };
         apart.into_iter().filter_map(may_be_there).collect()

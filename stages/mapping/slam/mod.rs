@@ -30,6 +30,7 @@ mod relocalization;
 mod revisits;
 mod scan_points;
 mod scan_registration;
+mod seen_tags;
 #[cfg(test)]
 mod tests;
 mod trajectory;
@@ -41,4 +42,4 @@ pub use odometry_noise::OdometryNoise;
 pub use pose_graph::{Constraint, PoseGraph};
 pub use recorded_map::recorded_map;
 pub use scan_points::{ScanPoint, scan_points};
-pub use trajectory::{LocatedScan, Trajectory};
+pub use trajectory::{LocatedScan, Trajectory, YAW_OF_MAP_SHARE};

@@ -1,11 +1,9 @@
 //! A graph of poses with relative measurements between them, and its most likely poses.
 
 use crate::shared::geometry::relative_pose::{self, rotation_of_pose};
-use crate::shared::geometry::{Point2, Pose2, quarter_turn};
-use crate::shared::sparse::{Columns, SimilarSystems, nested_dissection};
-use nalgebra::{Matrix3, UnitComplex, Vector3};
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use crate::shared::geometry::{Point2, Pose2};
+use crate::shared::sparse::{Columns, SimilarSystems, factor, nested_dissection};
+use nalgebra::{Matrix2, Matrix3, UnitComplex, Vector3};
 
 /// Largest number of Gauss-Newton steps.
 const MAX_STEPS: usize = 60;
@@ -17,7 +15,7 @@ const LEAST_SETTLING_STEP: f64 = 1e-3;
 /// Prior of each pose about where it was before a step, in standard deviations of a hundred metres or radians: the
 /// first pose is fixed by it alone where nothing else fixes it.
 const DAMPING: f64 = 1e-4;
-/// Information on the first pose, which fixes the frame.
+/// Information on the pose that fixes the frame.
 const FIXED: f64 = 1e12;
 /// Squared residual at which the influence of a loop closure falls, in variances: the 0.99 quantile of three
 /// dimensions.
@@ -68,11 +66,24 @@ pub(super) fn turned_information(information: &Matrix3<f64>, rotation: &UnitComp
     by * information * by.transpose()
 }
 
+/// Inverse of the variance of the yaw where the inverse of a covariance (x, y, yaw) is given. Where nothing shows the position,
+/// it has a standard deviation of a metre.
+pub(super) fn yaw_information(information: &Matrix3<f64>) -> f64 {
+    let position = information.fixed_view::<2, 2>(0, 0) + Matrix2::identity();
+    let with_yaw = information.fixed_view::<2, 1>(0, 2);
+    position.try_inverse().map_or(0.0, |covariance| information.m33 - with_yaw.dot(&(covariance * with_yaw))).max(0.0)
+}
+
 impl Constraint {
     /// Squared residual at two poses, in variances.
     pub fn squared_residual(&self, poses: &[Pose2]) -> f64 {
         let residual = relative_pose::residual(&poses[self.from], &poses[self.to], &self.transform);
         residual.dot(&(self.information * residual))
+    }
+
+    /// Whether it measures the yaw, and no position.
+    pub fn is_of_yaw_alone(&self) -> bool {
+        self.information.m11 == 0.0 && self.information.m22 == 0.0 && self.information.m33 > 0.0
     }
 
     /// Weight of a measurement with this squared residual: 1 for odometry, and less for loop closures that contradict
@@ -114,17 +125,21 @@ impl PoseGraph {
         self.iterate(false, solver);
     }
 
-    fn iterate(&mut self, is_graduated: bool, solver: &mut Solver) {
+    /// The poses and after them the landmarks as nodes, each of these where it was seen first; and all measurements.
+    fn nodes(&self) -> (Vec<Pose2>, Vec<Constraint>) {
         let count = self.poses.len();
         let mut nodes = self.poses.clone();
         let landmarks = self.sightings.iter().map(|sighting| sighting.landmark + 1).max().unwrap_or(0);
         nodes.resize(count + landmarks, Pose2::identity());
-        // A landmark is where it was seen first.
         for LandmarkSighting { from, landmark, place, .. } in self.sightings.iter().rev() {
             nodes[count + landmark] = Pose2::from_parts((nodes[*from] * place).into(), UnitComplex::identity());
         }
         let sightings = self.sightings.iter().map(|sighting| sighting.constraint(count));
-        let constraints: Vec<Constraint> = self.constraints.iter().copied().chain(sightings).collect();
+        (nodes, self.constraints.iter().copied().chain(sightings).collect())
+    }
+
+    fn iterate(&mut self, is_graduated: bool, solver: &mut Solver) {
+        let (mut nodes, constraints) = self.nodes();
         let loops = constraints.iter().filter(|constraint| constraint.is_loop);
         let largest = loops.map(|constraint| constraint.squared_residual(&nodes)).fold(0.0, f64::max);
         let (mut width, least_step) = match is_graduated {
@@ -144,46 +159,21 @@ impl PoseGraph {
             }
             width = (width / NARROWING).max(1.0);
         }
-        nodes.truncate(count);
+        nodes.truncate(self.poses.len());
         self.poses = nodes;
     }
 
-    /// Covariances of all poses relative to one of them, in its frame, along the most certain path of measurements:
-    /// an upper bound of what all of them together leave (Dijkstra projection, Olson 2008, "Robust and efficient
-    /// robotic mapping", section 3.5). `None` for what is not connected.
-    pub fn covariances_from(&self, start: usize) -> Vec<Option<Matrix3<f64>>> {
-        let mut beside: Vec<Vec<usize>> = vec![Vec::new(); self.poses.len()];
-        for (number, constraint) in self.constraints.iter().enumerate() {
-            beside[constraint.from].push(number);
-            beside[constraint.to].push(number);
-        }
-        let mut found: Vec<Option<Matrix3<f64>>> = vec![None; self.poses.len()];
-        let mut open = BinaryHeap::from([Reached { cost: 0.0, node: start, covariance: Matrix3::zeros() }]);
-        while let Some(Reached { node, covariance, .. }) = open.pop() {
-            if found[node].is_some() {
-                continue;
-            }
-            found[node] = Some(covariance);
-            let here = self.poses[start].inv_mul(&self.poses[node]);
-            for &number in &beside[node] {
-                let constraint = &self.constraints[number];
-                let other = if constraint.from == node { constraint.to } else { constraint.from };
-                if found[other].is_some() {
-                    continue;
-                }
-                let Some(own) = constraint.information.try_inverse() else { continue };
-                // The measurement's own error, turned into the frame of the start.
-                let turned = self.poses[start].rotation.inverse() * self.poses[constraint.from].rotation;
-                let turned = rotation_of_pose(&turned);
-                // The error of the yaw so far moves what lies ahead.
-                let there = self.poses[start].inv_mul(&self.poses[other]);
-                let lever = quarter_turn(&(there.translation.vector - here.translation.vector));
-                let moved = Matrix3::new(1.0, 0.0, lever.x, 0.0, 1.0, lever.y, 0.0, 0.0, 1.0);
-                let covariance = moved * covariance * moved.transpose() + turned * own * turned.transpose();
-                open.push(Reached { cost: covariance.trace(), node: other, covariance });
-            }
-        }
-        found
+    /// Covariances of all poses relative to one of them, in its frame, by all measurements with the weights that they have
+    /// at these poses. `None` if the equations have no solution.
+    pub fn covariances_from(&self, start: usize) -> Option<Vec<Matrix3<f64>>> {
+        let (nodes, constraints) = self.nodes();
+        let order = elimination_order(&nodes, &constraints);
+        let (columns, _) = equations(&nodes, &constraints, &order, start, 1.0);
+        let factor = factor(&columns)?;
+        let inverse = factor.selected_inverse();
+        let into = rotation_of_pose(&nodes[start].rotation.inverse());
+        let covariance = |&place: &usize| into * inverse.at(place, place) * into.transpose();
+        Some(order[..self.poses.len()].iter().map(covariance).collect())
     }
 }
 
@@ -198,42 +188,52 @@ pub struct Solver {
 impl Solver {
     /// A step of all nodes by their measurements. `None` if the equations have no solution.
     fn step(&mut self, nodes: &[Pose2], constraints: &[Constraint], width: f64) -> Option<Vec<Vector3<f64>>> {
-        let count = nodes.len();
-        if self.order.len() != count {
+        if self.order.len() != nodes.len() {
             self.order = elimination_order(nodes, constraints);
         }
-        let order = &self.order;
-        let mut columns: Columns = vec![Vec::new(); count];
-        let mut vector = vec![Vector3::zeros(); count];
-        let mut add = |row: usize, column: usize, block: Matrix3<f64>| {
-            let (row, column) = (order[row], order[column]);
-            if row >= column {
-                columns[column].push((row, block));
-            }
-        };
-        for node in 0..count {
-            let fixed = if node == 0 { FIXED } else { DAMPING };
-            add(node, node, Matrix3::identity() * fixed);
-        }
-        for constraint in constraints {
-            let (from, to) = (&nodes[constraint.from], &nodes[constraint.to]);
-            let residual = relative_pose::residual(from, to, &constraint.transform);
-            let squared = residual.dot(&(constraint.information * residual));
-            let information = constraint.information * constraint.weight(squared, width);
-            let [by_from, by_to] = relative_pose::derivatives(from, to);
-            let sides = [(constraint.from, by_from), (constraint.to, by_to)];
-            for (row, by_row) in &sides {
-                let weighted = by_row.transpose() * information;
-                vector[order[*row]] -= weighted * residual;
-                for (column, by_column) in &sides {
-                    add(*row, *column, weighted * by_column);
-                }
-            }
-        }
+        let (columns, vector) = equations(nodes, constraints, &self.order, 0, width);
         let solved = self.systems.solve(&columns, &vector)?;
-        let moves: Vec<Vector3<f64>> = order.iter().map(|&place| solved[place]).collect();
+        let moves: Vec<Vector3<f64>> = self.order.iter().map(|&place| solved[place]).collect();
         moves.iter().all(|step| step.iter().all(|value| value.is_finite())).then_some(moves)
     }
+}
+
+/// The normal equations of a step of all nodes, in the order of elimination; one of them stays where it is.
+fn equations(
+    nodes: &[Pose2],
+    constraints: &[Constraint],
+    order: &[usize],
+    held: usize,
+    width: f64,
+) -> (Columns, Vec<Vector3<f64>>) {
+    let mut columns: Columns = vec![Vec::new(); nodes.len()];
+    let mut vector = vec![Vector3::zeros(); nodes.len()];
+    let mut add = |row: usize, column: usize, block: Matrix3<f64>| {
+        let (row, column) = (order[row], order[column]);
+        if row >= column {
+            columns[column].push((row, block));
+        }
+    };
+    for node in 0..nodes.len() {
+        let fixed = if node == held { FIXED } else { DAMPING };
+        add(node, node, Matrix3::identity() * fixed);
+    }
+    for constraint in constraints {
+        let (from, to) = (&nodes[constraint.from], &nodes[constraint.to]);
+        let residual = relative_pose::residual(from, to, &constraint.transform);
+        let squared = residual.dot(&(constraint.information * residual));
+        let information = constraint.information * constraint.weight(squared, width);
+        let [by_from, by_to] = relative_pose::derivatives(from, to);
+        let sides = [(constraint.from, by_from), (constraint.to, by_to)];
+        for (row, by_row) in &sides {
+            let weighted = by_row.transpose() * information;
+            vector[order[*row]] -= weighted * residual;
+            for (column, by_column) in &sides {
+                add(*row, *column, weighted * by_column);
+            }
+        }
+    }
+    (columns, vector)
 }
 
 /// Places of the nodes in an order of elimination that leaves the factor sparse.
@@ -250,34 +250,6 @@ fn elimination_order(nodes: &[Pose2], constraints: &[Constraint]) -> Vec<usize> 
     let places: Vec<Point2> = nodes.iter().map(|pose| pose.translation.vector.into()).collect();
     nested_dissection(&places, &neighbours)
 }
-
-/// A node that the search of the most certain paths has reached.
-struct Reached {
-    cost: f64,
-    node: usize,
-    covariance: Matrix3<f64>,
-}
-
-impl Ord for Reached {
-    /// The least cost is the greatest, and of equal ones the first node.
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.cost.total_cmp(&self.cost).then(other.node.cmp(&self.node))
-    }
-}
-
-impl PartialOrd for Reached {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Reached {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Reached {}
 
 #[cfg(test)]
 mod tests {
@@ -351,14 +323,25 @@ mod tests {
     }
 
     #[test]
+    fn walls_on_one_side_show_the_yaw_as_far_as_they_show_it_wherever_the_robot_is() {
+        // A wall along x, seen from 3 m: the yaw moves what is far along it.
+        let corridor = Matrix3::new(0.0, 0.0, 0.0, 0.0, 900.0, 0.0, 0.0, 0.0, 2500.0);
+        assert!((yaw_information(&corridor) - 2500.0).abs() < 1e-9);
+        // What is on one side only shows a yaw that a move of the robot explains as well.
+        let one_side = Matrix3::new(0.0, 0.0, 0.0, 0.0, 900.0, 1500.0, 0.0, 1500.0, 2500.0);
+        assert!(yaw_information(&one_side) < 3.0);
+        assert_eq!(yaw_information(&Matrix3::zeros()), 0.0);
+    }
+
+    #[test]
     fn the_uncertainty_grows_along_the_drive_and_shrinks_by_a_loop_closure() {
         let (mut graph, truth) = square();
-        let at = |graph: &PoseGraph, node: usize| graph.covariances_from(0)[node].unwrap().trace();
+        let at = |graph: &PoseGraph, node: usize| graph.covariances_from(0).unwrap()[node].trace();
         assert!(at(&graph, 39) > 2.0 * at(&graph, 10));
         let open = at(&graph, 39);
         graph.constraints.push(closure(&truth, 0, 39));
+        assert!(at(&graph, 39) > 0.5 * open, "it contradicts the rest so far");
+        graph.optimize();
         assert!(at(&graph, 39) < 0.1 * open);
-        graph.poses.push(Pose2::identity());
-        assert!(graph.covariances_from(0)[40].is_none(), "nothing connects it");
     }
 }

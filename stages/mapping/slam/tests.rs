@@ -1,7 +1,9 @@
 //! Drives through a building whose walls are known, with odometry that drifts.
 
 use super::contradictions::{PlacedScan, find_contradictions};
-use super::{FramedTrajectory, ScanPoint, Trajectory, joint_contradictions, joint_poses, recorded_map, scan_points};
+use super::{
+    FramedTrajectory, PoseGraph, ScanPoint, Trajectory, joint_contradictions, joint_poses, recorded_map, scan_points,
+};
 use crate::shared::geometry::{Point2, Pose2, pose};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -199,6 +201,13 @@ fn scans_do_not_contradict_a_railing_that_was_looked_through_whenever_it_was_see
 
 /// The trajectory of a robot with a lidar of some metres, whose odometry goes too far and turns too far along the poses.
 fn driven(walls: &[[Point2; 2]], truth: &[Pose2], metres: f64, seed: u64) -> Trajectory {
+    let mut trajectory = added(walls, truth, metres, seed);
+    trajectory.finish();
+    trajectory
+}
+
+/// The same before the end of the drive.
+fn added(walls: &[[Point2; 2]], truth: &[Pose2], metres: f64, seed: u64) -> Trajectory {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut trajectory = Trajectory::new(0.1);
     let mut last = truth[0];
@@ -210,8 +219,26 @@ fn driven(walls: &[[Point2; 2]], truth: &[Pose2], metres: f64, seed: u64) -> Tra
         trajectory.add(&pose(way.x, way.y, moved.rotation.angle() + turn), points, Point2::origin());
         last = *at;
     }
-    trajectory.finish();
     trajectory
+}
+
+#[test]
+fn errors_of_the_yaw_do_not_add_up_as_those_of_the_position_do() {
+    let (walls, truth) = (walls(), &drive()[..180]);
+    let trajectory = added(&walls, truth, 30.0, 3);
+    let (poses, constraints) = (trajectory.poses().to_vec(), trajectory.constraints().to_vec());
+    assert!(trajectory.closures().next().is_none(), "it has not come back so far");
+    let covariances = PoseGraph { poses, constraints, ..Default::default() }.covariances_from(179).unwrap();
+    let deviation = |apart: usize| covariances[179 - apart].m33.sqrt();
+    assert!(deviation(160) < 2.0 * deviation(20), "{} {}", deviation(160), deviation(20));
+    for apart in [20, 40, 80, 160] {
+        let relative = |poses: &[Pose2]| poses[179].inv_mul(&poses[179 - apart]);
+        let (found, real) = (relative(trajectory.poses()), relative(truth));
+        let off = (found.translation.vector - real.translation.vector).norm();
+        let covariance = covariances[179 - apart];
+        assert!(off < 3.0 * (covariance.m11 + covariance.m22).sqrt(), "{apart}: {off}");
+        assert!((found.rotation / real.rotation).angle().abs() < 3.0 * deviation(apart), "{apart}");
+    }
 }
 
 #[test]
