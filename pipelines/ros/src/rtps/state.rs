@@ -36,6 +36,8 @@ pub(crate) struct Mismatch {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
     Writer,
+    /// A writer that matches only readers which state the hash of the type that it states, or none as it does.
+    WriterOfHash,
     Reader,
     /// A reader that matches only writers with the same definition of the type, and none of a run of Gridweave.
     ReaderOfRobots,
@@ -97,7 +99,7 @@ impl State {
 
     /// Makes a writer (or a reader) and announces it. Of `data` all but the identifier counts.
     pub(crate) fn create(&mut self, mut data: EndpointData, role: Role, now: Instant) -> Guid {
-        let is_writer = role == Role::Writer;
+        let is_writer = matches!(role, Role::Writer | Role::WriterOfHash);
         let number = self.next_number;
         self.next_number = self.next_number.wrapping_add(1).max(1);
         let entity = if is_writer { EntityId::writer(number) } else { EntityId::reader(number) };
@@ -228,6 +230,9 @@ impl State {
         let of_types = [here, there].map(|endpoint| (&endpoint.type_name, endpoint.type_hash.as_ref()));
         let has_other_type = of_types[0].0 != of_types[1].0;
         let has_other_hash = of_types[0].1 != of_types[1].1;
+        if announced.role == Role::WriterOfHash && has_other_hash {
+            return;
+        }
         if entity.is_writer() && !has_other_type && has_other_hash && of_types.iter().all(|(_, hash)| hash.is_some()) {
             // As among nodes of ROS, they are connected all the same.
             let mismatch = Mismatch { here: here.clone(), there: there.clone(), policies: Vec::new() };
