@@ -81,7 +81,9 @@ impl State {
         let reader = |entity| (entity, Reader::new(Guid { prefix, entity }, true));
         Self {
             prefix,
-            writers: [EntityId::PUBLICATIONS_WRITER, EntityId::SUBSCRIPTIONS_WRITER].map(writer).into(),
+            writers: [EntityId::PUBLICATIONS_WRITER, EntityId::SUBSCRIPTIONS_WRITER, EntityId::MESSAGES_WRITER]
+                .map(writer)
+                .into(),
             readers: [EntityId::PUBLICATIONS_READER, EntityId::SUBSCRIPTIONS_READER].map(reader).into(),
             announced: BTreeMap::new(),
             peers: BTreeMap::new(),
@@ -179,6 +181,11 @@ impl State {
                 reader.add_writer(Guid { prefix, entity: matching(entity) }, to.clone(), [true, true], now);
             }
         }
+        // Fast DDS up to 2.9 asks for it whether it is announced or not, and does not cease without an answer.
+        if let Some(writer) = self.writers.get_mut(&EntityId::MESSAGES_WRITER) {
+            let reader = Guid { prefix, entity: EntityId::MESSAGES_READER };
+            self.outgoing.extend(writer.add_reader(reader, to, [true, true], now));
+        }
         is_new
     }
 
@@ -231,6 +238,10 @@ impl State {
         let has_other_type = of_types[0].0 != of_types[1].0;
         let has_other_hash = of_types[0].1 != of_types[1].1;
         if announced.role == Role::WriterOfHash && has_other_hash {
+            let to = self.addresses_of(there);
+            if let Some(writer) = self.writers.get_mut(&entity) {
+                self.outgoing.extend(writer.add_unserved_reader(other, to));
+            }
             return;
         }
         if entity.is_writer() && !has_other_type && has_other_hash && of_types.iter().all(|(_, hash)| hash.is_some()) {
