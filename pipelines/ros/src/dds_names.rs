@@ -1,6 +1,6 @@
 //! The names of nodes on DDS: `rmw_dds_common/msg/ParticipantEntitiesInfo`, in which a participant says which endpoints
 //! are of which of its nodes. There are two forms of it under one name of the type, and nodes of Humble that get the one
-//! of later releases crash, or take all memory: each gets its own.
+//! of later releases crash, or take all memory: each participant gets the one that it publishes itself.
 
 use super::rtps::{Cursor, Guid, push_text};
 use std::fmt;

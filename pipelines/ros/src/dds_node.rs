@@ -7,7 +7,9 @@ use super::discovery::node_identity::NodeIdentity;
 use super::key_expression::{NO_HASH, Topic, type_in_keys};
 use super::liveliness::Entity;
 use super::qos::Qos;
-use super::rtps::{EndpointData, EntityId, Guid, LAST_DOMAIN, Participant, Policies, Reach, Reading, Sample, Writing};
+use super::rtps::{
+    EndpointData, EntityId, Guid, LAST_DOMAIN, Participant, Policies, Prefix, Reach, Reading, Sample, Writing,
+};
 use gridweave_runtime::stage::StageError;
 use std::collections::BTreeSet;
 use std::net::Ipv4Addr;
@@ -63,8 +65,8 @@ impl DdsNode {
         let (of_others, for_others) = (Arc::clone(&graph), Arc::downgrade(&own));
         let reading = participant.read_from(names(Form::Iron), false, move |sample| {
             let form = of_others.note_names(&sample.payload);
-            if let Some(own) = for_others.upgrade().filter(|_| form == Some(Form::Humble)) {
-                own.serve_humble();
+            if let (Some(own), Some(form)) = (for_others.upgrade(), form) {
+                own.serve(sample.writer.prefix, form);
             }
         });
         Ok(Self { own, _names: reading, graph, participant })
@@ -116,14 +118,20 @@ impl OwnNode {
         }
     }
 
-    /// Publishes the names for nodes of Humble, too.
-    fn serve_humble(&self) {
+    /// Publishes the names to a participant in the form in which it publishes its own: not all state it by the hash.
+    fn serve(&self, participant: Prefix, form: Form) {
         let endpoints = self.endpoints.lock().unwrap_or_else(PoisonError::into_inner);
-        self.humble_names.get_or_init(|| {
-            let writing = self.names.beside_of_hash(names(Form::Humble));
-            writing.write(&self.message(Form::Humble, &endpoints));
-            writing
-        });
+        let writing = match form {
+            Form::Iron => &self.names,
+            Form::Humble => self.humble_names.get_or_init(|| {
+                let writing = self.names.beside_to_hash(names(Form::Humble));
+                writing.write(&self.message(Form::Humble, &endpoints));
+                writing
+            }),
+        };
+        if writing.serve(participant) {
+            writing.write(&self.message(form, &endpoints));
+        }
     }
 
     fn message(&self, form: Form, endpoints: &BTreeSet<Guid>) -> Vec<u8> {

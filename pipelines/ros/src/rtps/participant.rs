@@ -128,7 +128,8 @@ impl Participant {
         Writing::new(&self.shared, data, Role::Writer)
     }
 
-    /// Makes a writer for those readers that state the hash of the type as `data` does, or none as `data`.
+    /// Makes a writer for those readers that state the hash of the type as `data` does, and those that it is told to
+    /// [serve](Writing::serve).
     pub(crate) fn write_to_hash(&self, data: EndpointData) -> Writing {
         Writing::new(&self.shared, data, Role::WriterOfHash)
     }
@@ -173,9 +174,14 @@ impl Writing {
         Self { shared: Arc::clone(shared), guid }
     }
 
-    /// Makes a writer of the same participant, for those readers that state the hash of the type as `data` does.
-    pub(crate) fn beside_of_hash(&self, data: EndpointData) -> Self {
+    /// The same of the same participant.
+    pub(crate) fn beside_to_hash(&self, data: EndpointData) -> Self {
         Self::new(&self.shared, data, Role::WriterOfHash)
+    }
+
+    /// Lets it serve all readers of a participant. Whether one of these misses what was written before.
+    pub(crate) fn serve(&self, participant: Prefix) -> bool {
+        self.shared.change(|state, now| state.serve(self.guid.entity, participant, now))
     }
 
     pub(crate) const fn guid(&self) -> Guid {

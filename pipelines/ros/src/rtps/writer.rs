@@ -136,6 +136,13 @@ impl Writer {
         self.empty_heartbeat_for(&guid)
     }
 
+    /// The readers of a participant that got nothing, which are not taken for such ones any longer.
+    pub(crate) fn take_unserved_readers(&mut self, prefix: Prefix) -> Vec<Guid> {
+        let readers: Vec<Guid> = self.unserved.keys().filter(|guid| guid.prefix == prefix).copied().collect();
+        self.unserved.retain(|guid, _| guid.prefix != prefix);
+        readers
+    }
+
     fn empty_heartbeat_for(&mut self, guid: &Guid) -> Option<Outgoing> {
         let to = self.unserved.get(guid)?.clone();
         self.heartbeats = self.heartbeats.wrapping_add(1);
@@ -151,7 +158,7 @@ impl Writer {
 
     pub(crate) fn remove_participant(&mut self, prefix: Prefix) {
         self.readers.retain(|guid, _| guid.prefix != prefix);
-        self.unserved.retain(|guid, _| guid.prefix != prefix);
+        self.take_unserved_readers(prefix);
     }
 
     /// A reader says what it has and asks for what it misses.

@@ -166,23 +166,29 @@ fn a_request_for_more_than_is_offered_is_reported_with_both_settings() {
     }
 }
 
-/// Nodes of Humble state no hashes of types, and crash by the names of nodes as later releases write them. Those of
-/// a later release in the same domain get theirs.
+/// Nodes of Humble state no hashes of types, and crash by the names of nodes as later releases write them; bridges state
+/// none, and have these. Each gets its own.
 #[test]
 #[ignore = "needs a Python with rclpy, named by GRIDWEAVE_ROS_PYTHON"]
-fn a_robot_of_humble_is_heard_and_reads_the_names_of_nodes() {
+fn robots_without_hashes_of_types_are_heard_and_read_the_names_of_nodes() {
     let (folder, domain) = (TempDir::new().unwrap(), Domain::new());
     let mut source = domain.source("node = \"listener\"");
     let mut sink = domain.sink("gridweave_ros", &[(OccupancyGrid::NAME, "/map")]);
     give(&mut sink, 0, "/map", map(20, 1));
-    let mut robot = start("cyclone_nodes.py", &domain, &["humble", "robot8", "60"], folder.path());
-    assert_eq!(sent(&mut source, "map", 1)[0].robot(), "robot8");
+    let start_robot =
+        |size, robot| start("cyclone_nodes.py", &domain, &["without_hashes", size, robot, "60"], folder.path());
+    let mut robots = [start_robot("24", "robot8"), start_robot("16", "robot9")];
+    let mut heard = BTreeSet::new();
+    wait_for(&mut source, "maps of both", |source| {
+        heard.extend(source.take_messages("map").iter().map(|message| message.robot().to_owned()));
+        heard.contains("robot8") && heard.contains("robot9")
+    });
     let seen = printed(start("rclpy_nodes.py", &domain, &["view", "400", "60"], folder.path()));
     assert_eq!(seen["publisher"][0], "gridweave_ros");
-    let named: serde_json::Value = serde_json::from_str(&robot.end_with(0)).unwrap();
-    assert_eq!(named, serde_json::json!(["listener", "gridweave_ros"]));
-    // It would say what it cannot read.
-    assert_eq!(robot.errors(), "");
+    for robot in &mut robots {
+        let named: serde_json::Value = serde_json::from_str(&robot.end_with(0)).unwrap();
+        assert_eq!(named, serde_json::json!(["listener", "gridweave_ros"]));
+    }
 }
 
 /// A map whose first cells are walls, and the others free.

@@ -107,23 +107,28 @@ class OccupancyGridUpdate(IdlStruct, typename="map_msgs::msg::dds_::OccupancyGri
     data: sequence[int8] = field(default_factory=list)
 
 
-@dataclass
-class Gid(IdlStruct, typename="rmw_dds_common::msg::dds_::Gid_"):
-    data: array[uint8, 24] = field(default_factory=lambda: [0] * 24)
+def names_of_nodes(size):
+    """The types of the names of nodes, whose identifiers have so many bytes."""
 
+    @dataclass
+    class Gid(IdlStruct, typename="rmw_dds_common::msg::dds_::Gid_"):
+        data: array[uint8, size] = field(default_factory=lambda: [0] * size)
 
-@dataclass
-class NodeEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::NodeEntitiesInfo_"):
-    node_namespace: str = "/"
-    node_name: str = ""
-    reader_gid_seq: sequence[Gid] = field(default_factory=list)
-    writer_gid_seq: sequence[Gid] = field(default_factory=list)
+    @dataclass
+    class NodeEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::NodeEntitiesInfo_"):
+        node_namespace: str = "/"
+        node_name: str = ""
+        reader_gid_seq: sequence[Gid] = field(default_factory=list)
+        writer_gid_seq: sequence[Gid] = field(default_factory=list)
 
+    @dataclass
+    class ParticipantEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"):
+        gid: Gid = field(default_factory=Gid)
+        node_entities_info_seq: sequence[NodeEntitiesInfo] = field(default_factory=list)
 
-@dataclass
-class ParticipantEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"):
-    gid: Gid = field(default_factory=Gid)
-    node_entities_info_seq: sequence[NodeEntitiesInfo] = field(default_factory=list)
+    # Zeros follow an identifier.
+    gid = lambda entity: Gid([*entity.guid.bytes, *[0] * (size - 16)])
+    return gid, NodeEntitiesInfo, ParticipantEntitiesInfo
 
 
 # With the encoding of ROS.
@@ -190,14 +195,11 @@ def updates(count, walls, longest):
     json.dump(cells, sys.stdout)
 
 
-def gid(entity):
-    """An identifier as Humble has it: zeros follow."""
-    return Gid([*entity.guid.bytes, *[0] * 8])
-
-
-def humble(robot, longest):
-    """Plays a robot of Humble: its endpoints state no hash of their types, and in the names of nodes identifiers are longer.
-    Prints as JSON the names of the nodes that hear its map and that publish the merged one, once it has both."""
+def without_hashes(size, robot, longest):
+    """Plays a robot whose endpoints state no hash of their types: one of Humble, where the identifiers in the names of nodes have 24
+    bytes, or a bridge of a later release, where they have 16. Prints as JSON the names of the nodes that hear its map and that
+    publish the merged one, once it has both."""
+    gid, NodeEntitiesInfo, ParticipantEntitiesInfo = names_of_nodes(int(size))
     participant = DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]), qos=Qos(Policy.Userdata(b"enclave=/;\0")))
     topic = Topic(participant, "ros_discovery_info", ParticipantEntitiesInfo)
     own, others = DataWriter(participant, topic, qos=LATCHED), DataReader(participant, topic, qos=ALL_LATCHED)
@@ -222,4 +224,4 @@ def humble(robot, longest):
         time.sleep(0.02)
 
 
-{f.__name__: f for f in (tf, frames, updates, humble)}[sys.argv[1]](*sys.argv[2:])
+{f.__name__: f for f in (tf, frames, updates, without_hashes)}[sys.argv[1]](*sys.argv[2:])
