@@ -1,7 +1,7 @@
 //! What nodes there are on DDS, and what they publish and subscribe to: endpoints as their participants announce them,
 //! with the names of the nodes that they belong to, which each participant publishes in one message.
 
-use super::dds_names::{NodeName, nodes};
+use super::dds_names::{Form, NodeName, nodes};
 use super::key_expression::{NO_HASH, Topic, type_of_key};
 use super::liveliness::{Entity, Kind};
 use super::qos::Qos;
@@ -76,14 +76,16 @@ impl Graph {
         lock(&self.seen).mismatches.retain(|(_, mismatch)| mismatch.here.guid != here);
     }
 
-    /// Records the names of a participant's nodes.
-    pub(crate) fn note_names(&self, message: &[u8]) {
+    /// Records the names of a participant's nodes. Gives the form of the message; `None` if it is broken.
+    pub(crate) fn note_names(&self, message: &[u8]) -> Option<Form> {
+        let (nodes, form) = nodes(message)?;
         let mut seen = lock(&self.seen);
-        for (name, endpoints) in nodes(message).unwrap_or_default() {
+        for (name, endpoints) in nodes {
             seen.names.extend(endpoints.into_iter().map(|endpoint| (endpoint, name.clone())));
         }
         drop(seen);
         self.settle();
+        Some(form)
     }
 
     /// Reports endpoints whose node is known, or was waited for long enough.
@@ -255,7 +257,7 @@ mod tests {
         graph.endpoint(&endpoint(3, "rt/robot2/map"), true);
         assert!(reported.try_recv().is_err(), "its name is waited for");
         let name = NodeName { namespace: "/robot2".into(), name: "slam_toolbox".into() };
-        let message = super::super::dds_names::message(Guid::default(), &name, &[endpoint(3, "").guid]);
+        let message = super::super::dds_names::message(Form::Iron, Guid::default(), &name, &[endpoint(3, "").guid]);
         graph.note_names(&message);
         let (entity, is_there) = reported.try_recv().unwrap();
         assert_eq!((entity.full_node_name().as_str(), is_there), ("/robot2/slam_toolbox", true));
@@ -307,7 +309,7 @@ mod tests {
         let (here, there) = (endpoint(1, "rt/map"), endpoint(2, "rt/map"));
         let here = EndpointData { policies: Policies::new(false, false, Some(5)), ..here };
         let name = NodeName { namespace: "/".into(), name: "rviz".into() };
-        graph.note_names(&super::super::dds_names::message(Guid::default(), &name, &[there.guid]));
+        graph.note_names(&super::super::dds_names::message(Form::Iron, Guid::default(), &name, &[there.guid]));
         for _ in 0..2 {
             graph.mismatch(&Mismatch { here: here.clone(), there: there.clone(), policies: vec!["reliability"] });
             graph.tick();

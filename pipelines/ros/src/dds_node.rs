@@ -2,16 +2,18 @@
 //! hash of a type is among the user data of its endpoints.
 
 use super::dds_graph::{Graph, NAMES_TOPIC, TOPIC_PREFIX};
-use super::dds_names::{self, NodeName, TYPE, TYPE_HASH};
+use super::dds_names::{self, Form, NodeName, TYPE};
 use super::discovery::node_identity::NodeIdentity;
 use super::key_expression::{NO_HASH, Topic, type_in_keys};
 use super::liveliness::Entity;
 use super::qos::Qos;
-use super::rtps::{EndpointData, EntityId, Guid, LAST_DOMAIN, Participant, Policies, Reach, Reading, Sample, Writing};
+use super::rtps::{
+    EndpointData, EntityId, Guid, LAST_DOMAIN, Participant, Policies, Prefix, Reach, Reading, Sample, Writing,
+};
 use gridweave_runtime::stage::StageError;
 use std::collections::BTreeSet;
 use std::net::Ipv4Addr;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// A node with a participant of its own.
 pub(crate) struct DdsNode {
@@ -27,6 +29,8 @@ struct OwnNode {
     name: NodeName,
     endpoints: Mutex<BTreeSet<Guid>>,
     names: Writing,
+    /// The names for nodes of Humble, once there is one.
+    humble_names: OnceLock<Writing>,
 }
 
 impl DdsNode {
@@ -49,17 +53,23 @@ impl DdsNode {
             .map_err(|error| StageError::new(doing, error).with_help("`middleware = \"zenoh\"` does without DDS"))?;
         let graph = Graph::new(domain);
         participant.watch(Box::new(Arc::clone(&graph)));
-        let names = endpoint(NAMES_TOPIC, TYPE, Some(TYPE_HASH), Policies::new(true, true, Some(1)));
-        let of_others = Arc::clone(&graph);
-        let reading = participant.read_from(names.clone(), false, move |sample| of_others.note_names(&sample.payload));
-        let own = OwnNode {
+        let own = Arc::new(OwnNode {
             participant: Guid { prefix: participant.prefix(), entity: EntityId::PARTICIPANT },
             name: NodeName { namespace: "/".to_owned(), name: name.node.clone() },
             endpoints: Mutex::default(),
-            names: participant.write_to(names),
-        };
+            names: participant.write_to_hash(names(Form::Iron)),
+            humble_names: OnceLock::new(),
+        });
         own.change(|_| {});
-        Ok(Self { own: Arc::new(own), _names: reading, graph, participant })
+        // What is read must not keep up what is written.
+        let (of_others, for_others) = (Arc::clone(&graph), Arc::downgrade(&own));
+        let reading = participant.read_from(names(Form::Iron), false, move |sample| {
+            let form = of_others.note_names(&sample.payload);
+            if let (Some(own), Some(form)) = (for_others.upgrade(), form) {
+                own.serve(sample.writer.prefix, form);
+            }
+        });
+        Ok(Self { own, _names: reading, graph, participant })
     }
 
     /// The name of its participant.
@@ -102,9 +112,37 @@ impl OwnNode {
     fn change(&self, change: impl FnOnce(&mut BTreeSet<Guid>)) {
         let mut endpoints = self.endpoints.lock().unwrap_or_else(PoisonError::into_inner);
         change(&mut endpoints);
-        let all: Vec<Guid> = endpoints.iter().copied().collect();
-        self.names.write(&dds_names::message(self.participant, &self.name, &all));
+        self.names.write(&self.message(Form::Iron, &endpoints));
+        if let Some(names) = self.humble_names.get() {
+            names.write(&self.message(Form::Humble, &endpoints));
+        }
     }
+
+    /// Publishes the names to a participant in the form in which it publishes its own: not all state it by the hash.
+    fn serve(&self, participant: Prefix, form: Form) {
+        let endpoints = self.endpoints.lock().unwrap_or_else(PoisonError::into_inner);
+        let writing = match form {
+            Form::Iron => &self.names,
+            Form::Humble => self.humble_names.get_or_init(|| {
+                let writing = self.names.beside_to_hash(names(Form::Humble));
+                writing.write(&self.message(Form::Humble, &endpoints));
+                writing
+            }),
+        };
+        if writing.serve(participant) {
+            writing.write(&self.message(form, &endpoints));
+        }
+    }
+
+    fn message(&self, form: Form, endpoints: &BTreeSet<Guid>) -> Vec<u8> {
+        let all: Vec<Guid> = endpoints.iter().copied().collect();
+        dds_names::message(form, self.participant, &self.name, &all)
+    }
+}
+
+/// The endpoint of names.
+fn names(form: Form) -> EndpointData {
+    endpoint(NAMES_TOPIC, TYPE, form.type_hash(), Policies::new(true, true, Some(1)))
 }
 
 /// An endpoint of the node, until it is dropped.

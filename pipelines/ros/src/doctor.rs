@@ -6,7 +6,7 @@ use super::discovery::doctor_subscriptions::DoctorSubscriptions;
 use super::discovery::node_identity::NodeIdentity;
 use super::discovery::publishers::{DiscoveredPublishers, Published, Topics};
 use super::discovery::running_merges::RunningMerges;
-use super::key_expression::NO_HASH;
+use super::key_expression::{NO_HASH, Topic};
 use super::node::Node;
 use super::qos::Qos;
 use super::source_parameters::SourceParameters;
@@ -56,9 +56,10 @@ fn look(parameters: toml::Table, longest: Duration) -> Result<String> {
         subscriptions.subscribe(&mut node, &topics(), &robots)?;
         thread::sleep(rest.min(PERIOD));
     }
-    let topics = topics();
+    let mut topics = topics();
     let mut text = networks(&node);
     write_topics(&mut text, &topics, &definitions)?;
+    remove_unreadable(&mut topics, &definitions);
     let findings = Findings::new(&topics, &robots);
     let running = merges.lock().unwrap_or_else(PoisonError::into_inner).text(&read_topics(&findings, &robots), &own);
     write_robots(&mut text, &findings, running, &subscriptions, &robots)?;
@@ -102,15 +103,28 @@ fn write_topics(text: &mut String, topics: &Topics, definitions: &Definitions) -
             ];
             let Published { ros_type, middleware, nodes, .. } = published;
             table.row([name.clone(), ros_type.clone(), middleware.to_string(), qos.join(", "), nodes.join(", ")]);
-            let topic = published.topic(name);
-            let has_other_hash = |here: &String| *here != topic.type_hash && topic.type_hash != NO_HASH;
-            if definitions.hash(&topic).is_some_and(|here| has_other_hash(&here)) {
-                others.push(format!("warning: `{name}` has another definition of {ros_type} than the one known here"));
+            if has_other_definition(&published.topic(name), definitions) {
+                others.push(format!(
+                    "warning: `{name}` has another definition of {ros_type} than the one known here: its messages are not taken"
+                ));
             }
         }
     }
     writeln!(text, "\n{table}")?;
     others.iter().try_for_each(|other| writeln!(text, "{other}"))
+}
+
+/// Whether the type of a topic has another definition than the one that is known here.
+fn has_other_definition(topic: &Topic, definitions: &Definitions) -> bool {
+    topic.type_hash != NO_HASH && definitions.hash(topic).is_some_and(|here| here != topic.type_hash)
+}
+
+/// Leaves out what no run takes.
+fn remove_unreadable(topics: &mut Topics, definitions: &Definitions) {
+    for (name, of_topic) in &mut *topics {
+        of_topic.retain(|published| !has_other_definition(&published.topic(name), definitions));
+    }
+    topics.retain(|_, of_topic| !of_topic.is_empty());
 }
 
 /// Says which robots have a map, what is missing for a merge, and what to write; or which are merged by a run that is
@@ -164,4 +178,37 @@ fn write_robots(
     }
     let is_said = with_map + with_scans >= 2;
     findings.advice(is_said).iter().try_for_each(|advice| writeln!(text, "{advice}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::discovery::node_identity::Owner;
+    use super::super::liveliness::{Entity, Kind};
+    use super::super::middleware::Middleware;
+    use super::*;
+    use gridweave_runtime::ros::{OccupancyGrid, RosMessage};
+
+    #[test]
+    fn a_map_whose_type_has_another_definition_is_no_map_of_a_robot() {
+        let mut publishers = DiscoveredPublishers::default();
+        let known = Topic::known("/robot1/map", OccupancyGrid::NAME).unwrap();
+        for (number, type_hash) in [known.type_hash.as_str(), NO_HASH, "RIHS01_00"].into_iter().enumerate() {
+            let topic = Topic { name: format!("/robot{number}/map"), type_hash: type_hash.to_owned(), ..known.clone() };
+            let entity = Entity {
+                domain: 0,
+                session: "a".into(),
+                node_number: 0,
+                number: number as u32,
+                enclave: "/".into(),
+                namespace: format!("/robot{number}"),
+                node: "slam".into(),
+                kind: Kind::Publisher(topic, Qos::reliable(1)),
+            };
+            publishers.note(Middleware::Dds, entity, Owner::Other, true);
+        }
+        let mut topics = publishers.topics();
+        remove_unreadable(&mut topics, &Definitions::new(&[]));
+        let findings = Findings::new(&topics, &RobotTopics::default());
+        assert_eq!(findings.maps.keys().collect::<Vec<_>>(), ["robot0", "robot1"]);
+    }
 }

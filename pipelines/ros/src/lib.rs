@@ -45,6 +45,7 @@ pub mod sink;
 pub mod source;
 mod source_parameters;
 mod zenoh_node;
+mod zenoh_without_hash;
 
 pub use doctor::doctor;
 use gridweave::shipped::Shipped;

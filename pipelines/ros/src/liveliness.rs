@@ -48,6 +48,12 @@ impl Entity {
         format!("{SPACE}/{domain}/**")
     }
 
+    /// The key expression that matches the tokens of all subscribers of a topic.
+    pub(crate) fn subscribers(domain: u32, topic: &Topic) -> String {
+        let (name, of) = (mangled(&topic.name), type_in_keys(&topic.ros_type));
+        format!("{SPACE}/{domain}/*/*/*/MS/*/*/*/{name}/{of}/{}/*", topic.type_hash)
+    }
+
     /// The identifier of its messages: the 128-bit XXH3 hash of the token.
     pub fn gid(&self) -> [u8; 16] {
         XxHash3_128::oneshot(self.to_string().as_bytes()).to_le_bytes()

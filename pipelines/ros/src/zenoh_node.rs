@@ -6,10 +6,12 @@ use super::discovery::node_identity::NodeIdentity;
 use super::key_expression::Topic;
 use super::liveliness::{Entity, Kind};
 use super::qos::Qos;
+use super::zenoh_without_hash::{PublisherWithoutHash, without_hash};
 use gridweave_bridge::clock::nanoseconds_now;
 use gridweave_bridge::zenoh_session::{in_words, is_connected};
 use gridweave_runtime::stage::StageError;
 use std::time::Duration;
+use zenoh::bytes::ZBytes;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::qos::CongestionControl;
 use zenoh::sample::{Sample, SampleKind};
@@ -92,8 +94,19 @@ impl ZenohNode {
     /// # Errors
     /// The topic has an invalid name, or the session has failed.
     pub(crate) fn publish(&mut self, topic: Topic, qos: Qos) -> Result<ZenohPublisher, StageError> {
-        let (name, key) = (topic.name.clone(), topic.key_expression(self.identity.domain));
+        let name = topic.name.clone();
         let failed = |error: zenoh::Error| StageError::new(format!("publish `{name}`"), in_words(&error));
+        let publisher = self.declare_publisher(&topic, qos).map_err(failed)?;
+        let (domain, old) = (self.identity.domain, without_hash(&topic));
+        let humble = self.declare_publisher(&old, qos).map_err(failed)?;
+        let humble = PublisherWithoutHash::new(&self.session, domain, &old, qos.is_latched, humble).map_err(failed)?;
+        let entity = self.entity(Kind::Publisher(topic, qos));
+        let token = declare(&self.session, &entity)?;
+        Ok(ZenohPublisher { publisher, humble, gid: entity.gid(), sequence: 0, name, _token: token })
+    }
+
+    fn declare_publisher(&self, topic: &Topic, qos: Qos) -> zenoh::Result<AdvancedPublisher<'static>> {
+        let key = topic.key_expression(self.identity.domain);
         let mut publisher = self.session.declare_publisher(key).congestion_control(CongestionControl::Block).advanced();
         if qos.is_latched {
             publisher = publisher
@@ -101,10 +114,7 @@ impl ZenohNode {
                 .sample_miss_detection(MissDetectionConfig::default().sporadic_heartbeat(HEARTBEAT))
                 .publisher_detection();
         }
-        let publisher = publisher.wait().map_err(failed)?;
-        let entity = self.entity(Kind::Publisher(topic, qos));
-        let token = declare(&self.session, &entity)?;
-        Ok(ZenohPublisher { publisher, gid: entity.gid(), sequence: 0, name, _token: token })
+        publisher.wait()
     }
 
     /// Subscribes to a topic: calls `call` with each message, first with those that its publishers have retained.
@@ -137,6 +147,7 @@ impl ZenohNode {
 /// A publisher of a topic.
 pub(crate) struct ZenohPublisher {
     publisher: AdvancedPublisher<'static>,
+    humble: PublisherWithoutHash,
     gid: [u8; 16],
     sequence: i64,
     name: String,
@@ -151,8 +162,11 @@ impl ZenohPublisher {
     pub(crate) fn send(&mut self, message: &[u8]) -> Result<(), StageError> {
         self.sequence += 1;
         let attachment = Attachment { sequence: self.sequence, source_time: nanoseconds_now(), gid: self.gid };
-        let sent = self.publisher.put(message).attachment(attachment.to_bytes().as_slice()).wait();
-        sent.map_err(|error| StageError::new(format!("publish `{}`", self.name), in_words(&error)))
+        let message = [ZBytes::from(message), ZBytes::from(attachment.to_bytes().as_slice())];
+        let [content, attachment] = message.clone();
+        let sent = self.publisher.put(content).attachment(attachment).wait();
+        sent.and_then(|()| self.humble.send(message))
+            .map_err(|error| StageError::new(format!("publish `{}`", self.name), in_words(&error)))
     }
 }
 

@@ -37,6 +37,10 @@ impl EntityId {
     pub(crate) const SUBSCRIPTIONS_WRITER: Self = Self([0, 0, 4, 0xc2]);
     pub(crate) const SUBSCRIPTIONS_READER: Self = Self([0, 0, 4, 0xc7]);
 
+    /// By these participants say that they are alive. Nothing is written here, as they say so by their announcements, too.
+    pub(crate) const MESSAGES_WRITER: Self = Self([0, 2, 0, 0xc2]);
+    pub(crate) const MESSAGES_READER: Self = Self([0, 2, 0, 0xc7]);
+
     /// The writer of a topic without keys, as all topics of ROS are.
     pub(crate) const fn writer(number: u16) -> Self {
         let [high, low] = number.to_be_bytes();

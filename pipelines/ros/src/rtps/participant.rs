@@ -125,8 +125,13 @@ impl Participant {
 
     /// Makes a writer. Of `data` all but the identifier counts.
     pub(crate) fn write_to(&self, data: EndpointData) -> Writing {
-        let guid = self.shared.change(|state, now| state.create(data, Role::Writer, now));
-        Writing { shared: Arc::clone(&self.shared), guid }
+        Writing::new(&self.shared, data, Role::Writer)
+    }
+
+    /// Makes a writer for those readers that state the hash of the type as `data` does, and those that it is told to
+    /// [serve](Writing::serve).
+    pub(crate) fn write_to_hash(&self, data: EndpointData) -> Writing {
+        Writing::new(&self.shared, data, Role::WriterOfHash)
     }
 
     /// Makes a reader, and calls `call` with what it hears: all that is published of its topic and type or, if it
@@ -164,6 +169,21 @@ pub(crate) struct Writing {
 }
 
 impl Writing {
+    fn new(shared: &Arc<Shared>, data: EndpointData, role: Role) -> Self {
+        let guid = shared.change(|state, now| state.create(data, role, now));
+        Self { shared: Arc::clone(shared), guid }
+    }
+
+    /// The same of the same participant.
+    pub(crate) fn beside_to_hash(&self, data: EndpointData) -> Self {
+        Self::new(&self.shared, data, Role::WriterOfHash)
+    }
+
+    /// Lets it serve all readers of a participant. Whether one of these misses what was written before.
+    pub(crate) fn serve(&self, participant: Prefix) -> bool {
+        self.shared.change(|state, now| state.serve(self.guid.entity, participant, now))
+    }
+
     pub(crate) const fn guid(&self) -> Guid {
         self.guid
     }

@@ -8,7 +8,7 @@ use super::outgoing::Outgoing;
 use super::policies::Policies;
 use super::reader::{Reader, Sample};
 use super::writer::Writer;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::net::{Ipv4Addr, SocketAddrV4};
 use std::time::Instant;
 
@@ -36,6 +36,9 @@ pub(crate) struct Mismatch {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
     Writer,
+    /// A writer that serves readers which state the hash of the type that it states, and all those of participants that
+    /// it is told to [serve](State::serve).
+    WriterOfHash,
     Reader,
     /// A reader that matches only writers with the same definition of the type, and none of a run of Gridweave.
     ReaderOfRobots,
@@ -48,6 +51,8 @@ struct Announced {
     data: EndpointData,
     /// The number of the announcement.
     sequence: i64,
+    /// The participants that it is told to serve.
+    served: BTreeSet<Prefix>,
 }
 
 /// Another participant.
@@ -79,7 +84,9 @@ impl State {
         let reader = |entity| (entity, Reader::new(Guid { prefix, entity }, true));
         Self {
             prefix,
-            writers: [EntityId::PUBLICATIONS_WRITER, EntityId::SUBSCRIPTIONS_WRITER].map(writer).into(),
+            writers: [EntityId::PUBLICATIONS_WRITER, EntityId::SUBSCRIPTIONS_WRITER, EntityId::MESSAGES_WRITER]
+                .map(writer)
+                .into(),
             readers: [EntityId::PUBLICATIONS_READER, EntityId::SUBSCRIPTIONS_READER].map(reader).into(),
             announced: BTreeMap::new(),
             peers: BTreeMap::new(),
@@ -97,7 +104,7 @@ impl State {
 
     /// Makes a writer (or a reader) and announces it. Of `data` all but the identifier counts.
     pub(crate) fn create(&mut self, mut data: EndpointData, role: Role, now: Instant) -> Guid {
-        let is_writer = role == Role::Writer;
+        let is_writer = matches!(role, Role::Writer | Role::WriterOfHash);
         let number = self.next_number;
         self.next_number = self.next_number.wrapping_add(1).max(1);
         let entity = if is_writer { EntityId::writer(number) } else { EntityId::reader(number) };
@@ -114,7 +121,7 @@ impl State {
             }
         }
         let sequence = self.announce(is_writer, [Vec::new(), data.to_bytes()], false, now);
-        self.announced.insert(entity, Announced { role, data, sequence });
+        self.announced.insert(entity, Announced { role, data, sequence, served: BTreeSet::new() });
         let others: Vec<Guid> = self.endpoints.keys().copied().collect();
         for other in others {
             self.match_pair(entity, other, now);
@@ -150,6 +157,21 @@ impl State {
         Some(sequence)
     }
 
+    /// Lets a writer serve all readers of a participant. Whether one was told before that there is nothing for it, which
+    /// holds for what was written until now.
+    pub(crate) fn serve(&mut self, entity: EntityId, prefix: Prefix, now: Instant) -> bool {
+        let Some(announced) = self.announced.get_mut(&entity).filter(|_| self.peers.contains_key(&prefix)) else {
+            return false;
+        };
+        if !announced.served.insert(prefix) {
+            return false;
+        }
+        let unserved =
+            self.writers.get_mut(&entity).map(|writer| writer.take_unserved_readers(prefix)).unwrap_or_default();
+        unserved.iter().for_each(|reader| self.match_pair(entity, *reader, now));
+        !unserved.is_empty()
+    }
+
     /// Whether a reliable reader lacks something of a writer.
     pub(crate) fn is_behind(&self, writer: EntityId) -> bool {
         self.writers.get(&writer).is_some_and(Writer::is_behind)
@@ -177,6 +199,11 @@ impl State {
                 reader.add_writer(Guid { prefix, entity: matching(entity) }, to.clone(), [true, true], now);
             }
         }
+        // Fast DDS up to 2.9 asks for it whether it is announced or not, and does not cease without an answer.
+        if let Some(writer) = self.writers.get_mut(&EntityId::MESSAGES_WRITER) {
+            let reader = Guid { prefix, entity: EntityId::MESSAGES_READER };
+            self.outgoing.extend(writer.add_reader(reader, to, [true, true], now));
+        }
         is_new
     }
 
@@ -187,6 +214,7 @@ impl State {
         }
         self.writers.values_mut().for_each(|writer| writer.remove_participant(prefix));
         self.readers.values_mut().for_each(|reader| reader.remove_participant(prefix));
+        self.announced.values_mut().for_each(|announced| _ = announced.served.remove(&prefix));
         let first = Guid { prefix, entity: EntityId::UNKNOWN };
         let gone: Vec<Guid> = self.endpoints.range(first..).map(|(guid, _)| *guid).collect();
         gone.into_iter().take_while(|guid| guid.prefix == prefix).for_each(|guid| self.remove_endpoint(guid));
@@ -228,6 +256,14 @@ impl State {
         let of_types = [here, there].map(|endpoint| (&endpoint.type_name, endpoint.type_hash.as_ref()));
         let has_other_type = of_types[0].0 != of_types[1].0;
         let has_other_hash = of_types[0].1 != of_types[1].1;
+        let is_served = announced.served.contains(&other.prefix) || (here.type_hash.is_some() && !has_other_hash);
+        if announced.role == Role::WriterOfHash && !is_served {
+            let to = self.addresses_of(there);
+            if let Some(writer) = self.writers.get_mut(&entity) {
+                self.outgoing.extend(writer.add_unserved_reader(other, to));
+            }
+            return;
+        }
         if entity.is_writer() && !has_other_type && has_other_hash && of_types.iter().all(|(_, hash)| hash.is_some()) {
             // As among nodes of ROS, they are connected all the same.
             let mismatch = Mismatch { here: here.clone(), there: there.clone(), policies: Vec::new() };

@@ -1,6 +1,7 @@
 //! A writer and a reader over a network that loses, swaps and repeats datagrams.
 
 use super::guid::{EntityId, Guid, Prefix};
+use super::number_set::NumberSet;
 use super::outgoing::{Content, Outgoing};
 use super::reader::Reader;
 use super::submessage::{Body, submessages};
@@ -134,6 +135,38 @@ impl Link {
         }
         panic!("not all is acknowledged: {:?}", self.writer);
     }
+}
+
+/// The first and the last sample that are there by heartbeats, which are all that is sent.
+#[track_caller]
+fn heartbeats(outgoing: impl IntoIterator<Item = Outgoing>) -> Vec<[i64; 2]> {
+    let datagrams = datagrams(outgoing.into_iter().collect());
+    let range = |body: &Body<'_>| match body {
+        Body::Heartbeat { first, last, .. } => [*first, *last],
+        other => panic!("{other:?}"),
+    };
+    datagrams
+        .iter()
+        .flat_map(|bytes| submessages(bytes).iter().map(|part| range(&part.body)).collect::<Vec<_>>())
+        .collect()
+}
+
+#[test]
+fn a_reader_that_is_not_served_is_told_that_there_is_nothing_once_it_asks() {
+    let (mut writer, now) = (Writer::new(WRITER, Some(1), true), Instant::now());
+    let write = |writer: &mut Writer| writer.write(0, [Vec::new(), payload(1, 9)], false, now).1;
+    write(&mut writer);
+    assert_eq!(heartbeats(writer.add_unserved_reader(READER, vec![ADDRESS])), [[2, 1]]);
+    let first_question = NumberSet::new(0, []);
+    assert_eq!(heartbeats(writer.take_acknack(READER, &first_question, 1, false, now)), [[2, 1]]);
+    assert_eq!(
+        heartbeats(writer.take_acknack(READER, &NumberSet::new(2, []), 2, false, now)),
+        <[[i64; 2]; 0]>::default()
+    );
+    assert_eq!(datagrams(write(&mut writer)).len(), 0);
+    assert!(!writer.is_behind() && writer.tick(now + Duration::from_secs(9)).is_empty());
+    writer.remove_participant(READER.prefix);
+    assert_eq!(datagrams(writer.take_acknack(READER, &first_question, 3, false, now)).len(), 0);
 }
 
 /// A sample of so many bytes, with its number in them. Its size needs no padding.

@@ -28,6 +28,8 @@ pub(crate) struct Writer {
     kept: BTreeMap<i64, Arc<Change>>,
     last: i64,
     readers: BTreeMap<Guid, MatchedReader>,
+    /// Readers that get nothing, with their addresses.
+    unserved: BTreeMap<Guid, Vec<SocketAddrV4>>,
     heartbeats: u32,
     interval: Duration,
     due: Option<Instant>,
@@ -62,6 +64,7 @@ impl Writer {
             kept: BTreeMap::new(),
             last: 0,
             readers: BTreeMap::new(),
+            unserved: BTreeMap::new(),
             heartbeats: 0,
             interval: FIRST_HEARTBEAT,
             due: None,
@@ -126,12 +129,36 @@ impl Writer {
         self.heartbeat_for(&guid).into_iter().collect()
     }
 
+    /// Takes up a reader that matches by the rules of DDS and is to get nothing. It is told that there is nothing for it,
+    /// or else it asks for ever.
+    pub(crate) fn add_unserved_reader(&mut self, guid: Guid, addresses: Vec<SocketAddrV4>) -> Option<Outgoing> {
+        self.unserved.insert(guid, addresses);
+        self.empty_heartbeat_for(&guid)
+    }
+
+    /// The readers of a participant that got nothing, which are not taken for such ones any longer.
+    pub(crate) fn take_unserved_readers(&mut self, prefix: Prefix) -> Vec<Guid> {
+        let readers: Vec<Guid> = self.unserved.keys().filter(|guid| guid.prefix == prefix).copied().collect();
+        self.unserved.retain(|guid, _| guid.prefix != prefix);
+        readers
+    }
+
+    fn empty_heartbeat_for(&mut self, guid: &Guid) -> Option<Outgoing> {
+        let to = self.unserved.get(guid)?.clone();
+        self.heartbeats = self.heartbeats.wrapping_add(1);
+        let (route, range) = (self.route(guid.prefix, guid.entity), [self.last + 1, self.last]);
+        let message = route.message().heartbeat(guid.entity, self.guid.entity, range, self.heartbeats);
+        Some(Outgoing { to, content: Content::Message(message) })
+    }
+
     pub(crate) fn remove_reader(&mut self, guid: &Guid) {
         self.readers.remove(guid);
+        self.unserved.remove(guid);
     }
 
     pub(crate) fn remove_participant(&mut self, prefix: Prefix) {
         self.readers.retain(|guid, _| guid.prefix != prefix);
+        self.take_unserved_readers(prefix);
     }
 
     /// A reader says what it has and asks for what it misses.
@@ -143,6 +170,9 @@ impl Writer {
         is_final: bool,
         now: Instant,
     ) -> Vec<Outgoing> {
+        if !is_final && known_nothing(missing) && self.unserved.contains_key(&reader) {
+            return self.empty_heartbeat_for(&reader).into_iter().collect();
+        }
         let route = self.route(reader.prefix, reader.entity);
         let Some(known) = self.readers.get_mut(&reader).filter(|known| is_later(count, known.request)) else {
             return Vec::new();

@@ -2,14 +2,14 @@
 //! multicast, as ROS 2 does where nothing is set.
 
 use crate::command::{GRIDWEAVE, run};
-use crate::ros_nodes::{script, simulate};
+use crate::ros_nodes::{python, script, simulate};
 use std::path::Path;
 use tempfile::TempDir;
 
 #[test]
 #[ignore = "needs the right to make network namespaces, and a Python with rclpy, named by GRIDWEAVE_ROS_PYTHON"]
 fn network_namespaces_of_robots_and_a_merge_find_each_other_by_multicast() {
-    let python = std::env::var("GRIDWEAVE_ROS_PYTHON").expect("GRIDWEAVE_ROS_PYTHON names a Python with rclpy");
+    let python = python();
     let folder = TempDir::new().unwrap();
     let folder = folder.path();
     simulate(folder);

@@ -2,6 +2,7 @@
 
 use crate::waiting::{give, sent, wait_for, warned};
 use crate::wire::{Robot, Router, Sender, WATCHDOG, topic};
+use gridweave_ros::key_expression::{NO_HASH, Topic};
 use gridweave_ros::qos::Qos;
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::pipeline::{Mode, Overrides, Pipeline};
@@ -203,6 +204,23 @@ fn late_joiners_get_the_merged_map_also_after_a_restart() {
     drop(first);
     let _second = sink(8);
     assert_eq!((of_value(early.next()), of_value(late.next())), (8, 8));
+}
+
+/// Types have no hash in Humble.
+#[test]
+fn subscribers_without_a_hash_of_the_type_get_the_last_map_and_those_after_it() {
+    let router = Router::start();
+    let mut sink = sink(&router.parameters(), &[(OccupancyGrid::NAME, "/map")]);
+    give(&mut sink, 0, "/map", map("", 10));
+    let robot = Robot::start(&router, "rviz");
+    robot.wait_for_token(&format!("/{}/:1:,1:,:,:,,", topic("/map", OccupancyGrid::NAME).type_hash));
+    let old = Topic { type_hash: NO_HASH.into(), ..topic("/map", OccupancyGrid::NAME) };
+    for value in [20, 30] {
+        let subscriber = robot.subscribe(&old, Qos::latched(1));
+        assert_eq!(subscriber.next(), map("", value - 10));
+        give(&mut sink, 0, "/map", map("", value));
+        assert_eq!(subscriber.next(), map("", value));
+    }
 }
 
 #[test]

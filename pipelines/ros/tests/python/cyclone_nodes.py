@@ -16,7 +16,7 @@ os.environ["CYCLONEDDS_URI"] = """<CycloneDDS><Domain>
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import float32, float64, int8, int32, sequence, uint32
+from cyclonedds.idl.types import array, float32, float64, int8, int32, sequence, uint8, uint32
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
@@ -107,9 +107,34 @@ class OccupancyGridUpdate(IdlStruct, typename="map_msgs::msg::dds_::OccupancyGri
     data: sequence[int8] = field(default_factory=list)
 
 
+def names_of_nodes(size):
+    """The types of the names of nodes, whose identifiers have so many bytes."""
+
+    @dataclass
+    class Gid(IdlStruct, typename="rmw_dds_common::msg::dds_::Gid_"):
+        data: array[uint8, size] = field(default_factory=lambda: [0] * size)
+
+    @dataclass
+    class NodeEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::NodeEntitiesInfo_"):
+        node_namespace: str = "/"
+        node_name: str = ""
+        reader_gid_seq: sequence[Gid] = field(default_factory=list)
+        writer_gid_seq: sequence[Gid] = field(default_factory=list)
+
+    @dataclass
+    class ParticipantEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"):
+        gid: Gid = field(default_factory=Gid)
+        node_entities_info_seq: sequence[NodeEntitiesInfo] = field(default_factory=list)
+
+    # Zeros follow an identifier.
+    gid = lambda entity: Gid([*entity.guid.bytes, *[0] * (size - 16)])
+    return gid, NodeEntitiesInfo, ParticipantEntitiesInfo
+
+
 # With the encoding of ROS.
 RELIABLE = [Policy.Reliability.Reliable(duration(seconds=1)), Policy.DataRepresentation(use_cdrv0_representation=True)]
 LATCHED = Qos(*RELIABLE, Policy.Durability.TransientLocal, Policy.History.KeepLast(1))
+ALL_LATCHED = Qos(*RELIABLE, Policy.Durability.TransientLocal, Policy.History.KeepAll)
 VOLATILE = Qos(*RELIABLE, Policy.Durability.Volatile, Policy.History.KeepLast(100))
 
 
@@ -170,4 +195,33 @@ def updates(count, walls, longest):
     json.dump(cells, sys.stdout)
 
 
-{f.__name__: f for f in (tf, frames, updates)}[sys.argv[1]](*sys.argv[2:])
+def without_hashes(size, robot, longest):
+    """Plays a robot whose endpoints state no hash of their types: one of Humble, where the identifiers in the names of nodes have 24
+    bytes, or a bridge of a later release, where they have 16. Prints as JSON the names of the nodes that hear its map and that
+    publish the merged one, once it has both."""
+    gid, NodeEntitiesInfo, ParticipantEntitiesInfo = names_of_nodes(int(size))
+    participant = DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]), qos=Qos(Policy.Userdata(b"enclave=/;\0")))
+    topic = Topic(participant, "ros_discovery_info", ParticipantEntitiesInfo)
+    own, others = DataWriter(participant, topic, qos=LATCHED), DataReader(participant, topic, qos=ALL_LATCHED)
+    maps = DataWriter(participant, Topic(participant, f"rt/{robot}/map", OccupancyGrid), qos=LATCHED)
+    merged = DataReader(participant, Topic(participant, "rt/map", OccupancyGrid), qos=LATCHED)
+    node = NodeEntitiesInfo(f"/{robot}", "slam_toolbox", [gid(merged)], [gid(maps)])
+    own.write(ParticipantEntitiesInfo(gid(participant), [node]))
+    maps.write(OccupancyGrid(Header(Time(1, 0), "map"), MapMetaData(width=2, height=2), [0, 100, 0, -1]))
+    names, end = {}, time.monotonic() + float(longest)
+    while True:
+        for message in others.take(10):
+            for node in message.node_entities_info_seq:
+                for one in [*node.reader_gid_seq, *node.writer_gid_seq]:
+                    names[bytes(one.data[:16])] = node.node_name
+        hearing = [maps.get_matched_subscription_data(one).key for one in maps.get_matched_subscriptions()]
+        publishing = [merged.get_matched_publication_data(one).key for one in merged.get_matched_publications()]
+        found = [names.get(one.bytes) for one in [*hearing, *publishing]]
+        if len(found) == 2 and all(found) and merged.read():
+            return json.dump(found, sys.stdout)
+        if time.monotonic() > end:
+            sys.exit(f"{found} are named, and {len(merged.read())} merged maps are there")
+        time.sleep(0.02)
+
+
+{f.__name__: f for f in (tf, frames, updates, without_hashes)}[sys.argv[1]](*sys.argv[2:])

@@ -96,6 +96,37 @@ def view(least_known, longest):
     json.dump(seen, sys.stdout)
 
 
+def follow(count, walls, longest):
+    """Keeps a map by its updates, as RViz does, and static transforms: says when so many updates have come, and ends when so many
+    cells are walls, with all as JSON. It needs the packages map_msgs and tf2_msgs."""
+    from map_msgs.msg import OccupancyGridUpdate
+    from tf2_msgs.msg import TFMessage
+
+    node, seen, frames = rclpy.create_node("viewer"), {"cells": [], "updates": 0}, {}
+
+    def take(grid):
+        seen.update(cells=list(grid.data), width=grid.info.width)
+
+    def update(part):
+        seen["updates"] += 1
+        if seen["updates"] == int(count):
+            print("hears updates", flush=True)
+        for row in range(part.height if seen["cells"] else 0):
+            start = (part.y + row) * seen["width"] + part.x
+            seen["cells"][start : start + part.width] = part.data[row * part.width : (row + 1) * part.width]
+
+    def place(message):
+        for one in message.transforms:
+            at = one.transform.translation
+            frames[one.child_frame_id] = [one.header.frame_id, at.x, at.y]
+
+    node.create_subscription(OccupancyGrid, "/map", take, LATCHED)
+    node.create_subscription(OccupancyGridUpdate, "/map_updates", update, QoSProfile(depth=100))
+    node.create_subscription(TFMessage, "/tf_static", place, LATCHED)
+    until(node, lambda: seen["cells"].count(100) == int(walls) and frames, float(longest), f"{walls} walls, and frames")
+    print(json.dumps([seen["cells"], frames]))
+
+
 def ask_for_more():
     """Asks for a durability that is not offered, says when it knows that, and stays until standard input ends."""
     from rclpy.event_handler import SubscriptionEventCallbacks
@@ -134,4 +165,4 @@ def read_log(log):
 
 
 rclpy.init()
-{f.__name__: f for f in (robots, publish_map, publish_strings, view, ask_for_more, read_log)}[sys.argv[1]](*sys.argv[2:])
+{f.__name__: f for f in (robots, publish_map, publish_strings, view, follow, ask_for_more, read_log)}[sys.argv[1]](*sys.argv[2:])
