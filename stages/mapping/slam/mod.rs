@@ -5,8 +5,9 @@
 //! submaps of some metres. A finished submap is searched in each earlier one that may be at the same place, by branch
 //! and bound on a likelihood field; what fits, and fits nowhere else, becomes a loop closure. After a long way, when a
 //! pose is less certain than places that look alike are apart, the last metres are searched in all that may be there at
-//! once, and a place at which beams pass through walls is another one. Scans are the nodes of a pose graph, whose most
-//! likely poses are solved for after each closure, with a robust weight for closures. At the end each scan is registered
+//! once, and a place at which beams pass through walls is another one. Scans are the nodes of a pose graph: each is measured
+//! against the one before it, and its yaw against the middle of the local map, too. The most likely poses are solved for
+//! after each closure, with a robust weight for closures, and their covariances show where closures may be. At the end each scan is registered
 //! on what was seen at its place at other times, by any of the robots whose relative poses are known ([`joint_poses`]),
 //! or on a [recorded map](recorded_map). Tags that are seen are landmarks of the graph.
 //!
