@@ -227,7 +227,8 @@ fn check_robots(
             continue;
         };
         let of_robot = spans.entry(classified.robot).or_default();
-        let overlaps = |(other, from, to): &&(usize, u64, u64)| *other != input && *from <= last && first <= *to;
+        let overlaps =
+            |(other, from, to): &&(usize, u64, u64)| *other != input && are_of_one_time([*from, *to], [first, last]);
         if let Some((other, ..)) = of_robot.iter().find(overlaps)
             && let [Some(one), Some(other)] = [inputs.get(*other), inputs.get(input)]
         {
@@ -237,6 +238,14 @@ fn check_robots(
         of_robot.push((input, first, last));
     }
     Ok(())
+}
+
+/// Whether two spans of time have half of the shorter one or more in common. Parts of one recording may overlap a little where
+/// one ends and the next begins, as messages that came together are not written in the order of their times.
+fn are_of_one_time(one: [u64; 2], other: [u64; 2]) -> bool {
+    let [start, end] = [one[0].max(other[0]), one[1].min(other[1])];
+    let shorter = one[1].saturating_sub(one[0]).min(other[1].saturating_sub(other[0]));
+    end.checked_sub(start).is_some_and(|common| common >= shorter.div_ceil(2))
 }
 
 /// The topic for the transforms of all robots, if the channel carries transforms.

@@ -166,12 +166,13 @@ fn two_logs_of_one_time_do_not_give_one_robot_two_maps() {
         }
         folder.write(name, &log.finish())
     };
-    let [first, same_time, later] =
-        [("a.mcap", 0), ("b.mcap", 5), ("c.mcap", 11)].map(|(name, from)| write(name, from));
+    let [first, same_time, next_part, later] =
+        [("a.mcap", 0), ("b.mcap", 5), ("d.mcap", 9), ("c.mcap", 11)].map(|(name, from)| write(name, from));
     let opened = |paths: &[PathBuf]| open(&inputs(paths), &NameRules::default(), &RobotTopics::default()).map(|_| ());
     let error = opened(&[first.clone(), same_time.clone()]).unwrap_err().to_string();
     assert!(error.contains("have maps of `robot1` at the same time") && error.contains("A="), "{error}");
     opened(&[first.clone(), later]).unwrap();
+    opened(&[first.clone(), next_part]).unwrap();
     let named =
         [("a", &first), ("b", &same_time)].map(|(robot, path)| Input { robot: Some(robot.into()), path: path.clone() });
     assert_eq!(topics(&named, &NameRules::default()), [["/a/map"], ["/b/map"]]);
