@@ -19,8 +19,8 @@ use std::f64::consts::{PI, TAU};
 /// Arguments of the experiment `pose-certainty`.
 #[derive(Debug, Args)]
 pub(super) struct PoseCertaintyArgs {
-    /// How many buildings, in each of which a robot with each lidar drives.
-    #[arg(long, default_value_t = 6)]
+    /// How many buildings, in each of which a robot with each lidar drives: at least two, as each is left out once.
+    #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u64).range(2..))]
     seeds: u64,
     /// The first seed.
     #[arg(long, default_value_t = 1)]
