@@ -12,9 +12,10 @@ const NARROWING: f64 = 2.0;
 /// Steps shorter than this end the iteration, metres and radians; and those where measurements are made anew after it.
 const LEAST_STEP: f64 = 1e-4;
 const LEAST_SETTLING_STEP: f64 = 1e-3;
-/// Prior of each pose about where it was before a step, in standard deviations of a hundred metres or radians: the
-/// first pose is fixed by it alone where nothing else fixes it.
-const DAMPING: f64 = 1e-4;
+/// Information on where each pose was before a step, which fixes what nothing else fixes. So little that thousands of poses do
+/// not together hold a drive of a kilometre by its lever: they would be taken for more certain than their measurements make
+/// them, and loops would not close.
+const DAMPING: f64 = 1e-9;
 /// Information on the pose that fixes the frame.
 const FIXED: f64 = 1e12;
 /// Squared residual at which the influence of a loop closure falls, in variances: the 0.99 quantile of three
@@ -343,5 +344,25 @@ mod tests {
         assert!(at(&graph, 39) > 0.5 * open, "it contradicts the rest so far");
         graph.optimize();
         assert!(at(&graph, 39) < 0.1 * open);
+    }
+
+    #[test]
+    fn a_drive_of_half_a_kilometre_is_as_uncertain_as_its_steps() {
+        let (steps, length, deviation) = (1500, 0.35, 0.004);
+        let moved = pose(length, 0.0, 0.0);
+        let information = Matrix3::from_diagonal(&Vector3::new(1e4, 1e4, f64::powi(deviation, -2)));
+        let poses = (0..=steps).map(|step| pose(length * step as f64, 0.0, 0.0)).collect();
+        let step = |to: usize| Constraint { from: to - 1, to, transform: moved, information, is_loop: false };
+        let mut graph = PoseGraph { poses, constraints: (1..=steps).map(step).collect(), ..Default::default() };
+        let yaw = graph.covariances_from(0).unwrap()[steps].m33.sqrt();
+        let by_steps = deviation * (steps as f64).sqrt();
+        assert!((0.95..1.0 + 1e-9).contains(&(yaw / by_steps)), "{yaw} {by_steps}");
+
+        // A place known again at its end turns it as a whole, whatever the way before it.
+        let turned = pose(0.0, 0.0, 0.5 * by_steps) * graph.poses[steps];
+        graph.constraints.push(Constraint { to: steps, transform: turned, ..closure(&graph.poses, 0, steps) });
+        graph.optimize();
+        let off = (graph.poses[steps].translation.vector - turned.translation.vector).norm();
+        assert!(off < 0.1, "{off}");
     }
 }
