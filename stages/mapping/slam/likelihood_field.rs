@@ -101,6 +101,12 @@ impl LikelihoodField {
         [floor(at.x), floor(at.y)]
     }
 
+    /// Sum of the likelihoods at points.
+    pub(super) fn likelihood(&self, points: impl Iterator<Item = Point2>) -> f64 {
+        let cells: Vec<[i32; 2]> = points.map(|point| self.cell(&point)).collect();
+        f64::from(self.sum(0, &cells, [0, 0])) / 255.0
+    }
+
     /// Sum of the values of a level at cells that are moved by `offset`; 255 for each on a wall.
     pub(super) fn sum(&self, level: usize, cells: &[[i32; 2]], offset: [i32; 2]) -> u32 {
         let values = &self.levels[level];

@@ -6,7 +6,7 @@ use super::pose_graph::{Constraint, PoseGraph, turned_information};
 use super::scan_points::ScanPoint;
 use super::scan_registration::{GAIN, thinned};
 use crate::shared::geometry::Pose2;
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Translation2, Vector2, Vector3};
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -31,6 +31,12 @@ pub(super) const OTHER_PLACE: [f64; 2] = [0.5, 0.15];
 const UNCERTAIN: f64 = 0.5;
 /// Share of the information of a registration that a closure has: the submaps are bent themselves.
 const INFORMATION_SHARE: f64 = 0.3;
+/// Shift by which it is seen whether walls show where along them a submap is, metres, and the least evidence that is lost by it:
+/// a standard deviation of seven metres.
+const SLIDE: f64 = 0.3;
+const LEAST_LOST: f64 = 1e-3;
+/// Information on a pose of which nothing else is known, so that it has a covariance.
+const LEAST_INFORMATION: f64 = 1e-6;
 
 /// Distance of the squares of a recorded map that are part of the map around one, metres: what a lidar sees from there.
 const RECORDED_AROUND: f64 = 14.0;
@@ -184,12 +190,58 @@ impl Revisit<'_> {
         if search(&field, &searched, &prior, GAIN, least, Some(&excluded)).is_some() {
             return None;
         }
-        Some(Constraint {
-            from: at,
-            to: centre,
-            transform: fit.pose,
-            information: INFORMATION_SHARE * fit.information,
-            is_loop: true,
-        })
+        let evidence_at = |shift: Vector2<f64>| {
+            let shifted = Translation2::from(shift) * fit.pose;
+            GAIN * field.likelihood(searched.iter().map(|point| shifted * point))
+        };
+        let information = without_slide(&(INFORMATION_SHARE * fit.information), evidence_at);
+        Some(Constraint { from: at, to: centre, transform: fit.pose, information, is_loop: true })
+    }
+}
+
+/// The information on a pose whose position is known no better, in the direction in which it is least known, than the evidence
+/// falls where it is shifted that way. In a corridor the normals of walls are noisy and door frames may meet others: both seem to
+/// show where along it a submap is, though its points lie as well on the walls elsewhere.
+fn without_slide(information: &Matrix3<f64>, evidence_at: impl Fn(Vector2<f64>) -> f64) -> Matrix3<f64> {
+    let Some(covariance) = (information + Matrix3::identity() * LEAST_INFORMATION).try_inverse() else {
+        return *information;
+    };
+    let position = covariance.fixed_view::<2, 2>(0, 0).into_owned().symmetric_eigen();
+    let widest = position.eigenvalues.imax();
+    let along = position.eigenvectors.column(widest).into_owned();
+    let shifted = evidence_at(SLIDE * along).max(evidence_at(-SLIDE * along));
+    let lost = (evidence_at(Vector2::zeros()) - shifted).max(LEAST_LOST);
+    // Of a normal distribution, whose logarithm falls by this.
+    let variance = SLIDE * SLIDE / (2.0 * lost);
+    let excess = (variance - position.eigenvalues[widest]).max(0.0);
+    let along = Vector3::new(along.x, along.y, 0.0);
+    (covariance + excess * along * along.transpose()).try_inverse().unwrap_or(*information)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Standard deviations along x, y and of the yaw.
+    fn deviations(information: &Matrix3<f64>) -> [f64; 3] {
+        let covariance = information.try_inverse().unwrap();
+        [0, 1, 2].map(|axis| covariance[(axis, axis)].sqrt())
+    }
+
+    #[test]
+    fn a_place_along_a_corridor_is_as_certain_as_the_evidence_falls_beside_it() {
+        let seeming = Matrix3::from_diagonal(&Vector3::new(0.05, 0.01, 0.004).map(|deviation: f64| deviation.powi(-2)));
+        // Nothing is lost along x.
+        let [x, y, yaw] = deviations(&without_slide(&seeming, |shift| 30.0 - 2000.0 * shift.y * shift.y));
+        assert!(x > 2.0 && (y - 0.01).abs() < 1e-6 && (yaw - 0.004).abs() < 1e-6, "{x} {y} {yaw}");
+        // As much as by a standard deviation of 0.2 m.
+        let [x, ..] = deviations(&without_slide(&seeming, |shift| -0.5 * shift.norm_squared() / 0.04));
+        assert!((x - 0.2).abs() < 1e-6, "{x}");
+        // More than the normals say, which remain what they are.
+        let [x, ..] = deviations(&without_slide(&seeming, |shift| -1e3 * shift.norm_squared()));
+        assert!((x - 0.05).abs() < 1e-4, "{x}");
+        // Elsewhere it is likelier.
+        let [x, ..] = deviations(&without_slide(&seeming, |shift| shift.x));
+        assert!(x > 2.0, "{x}");
     }
 }
