@@ -81,15 +81,13 @@ fn best_of_turn(
     parameters: &TopologyMatcherParameters,
 ) -> Vec<Trial> {
     let turned: Vec<Vector2<f64>> = b.nodes.iter().map(|node| rotation * node.coords).collect();
-    let candidates = candidates(a, b, &turned, parameters.tolerance);
-    if candidates.is_empty() {
+    let candidates = Candidates::new(a, b, &turned, parameters.tolerance);
+    if candidates.sorted.is_empty() {
         return Vec::new();
     }
     let trials = a.nodes.iter().flat_map(|node| turned.iter().map(move |turned| node.coords - turned));
-    let mut trials: Vec<Trial> = trials
-        .map(|translation| trial(translation, &candidates, parameters.tolerance))
-        .filter(|trial| trial.similarity > 0)
-        .collect();
+    let mut trials: Vec<Trial> =
+        trials.map(|translation| candidates.trial(translation)).filter(|trial| trial.similarity > 0).collect();
     trials.sort_by(|one, other| other.similarity.cmp(&one.similarity).then(one.distance.total_cmp(&other.distance)));
     let mut best: Vec<Trial> = Vec::new();
     for trial in &trials {
@@ -103,50 +101,80 @@ fn best_of_turn(
     best
 }
 
-/// All pairs of paths that coincide at some translation, by the x of the translation in their middle.
-fn candidates(a: &Topology, b: &Topology, turned: &[Vector2<f64>], tolerance: f64) -> Vec<Candidate> {
-    let mut found = Vec::new();
-    let paths_a: Vec<[usize; 2]> = a.long_paths(tolerance).collect();
-    for [start, end] in b.long_paths(tolerance) {
-        let along = turned[end] - turned[start];
-        for ends in &paths_a {
-            let [first, second] = ends.map(|node| a.nodes[node].coords);
-            let across = second - first;
-            let mut add = |start: usize, end: usize| {
-                found.push(Candidate { first: first - turned[start], second: second - turned[end] });
-            };
-            if (across - along).norm() <= 2.0 * tolerance {
-                add(start, end);
-            }
-            if (across + along).norm() <= 2.0 * tolerance {
-                add(end, start);
+/// The pairs of paths that coincide at some translation, in columns of the translation in their middle.
+struct Candidates {
+    /// By column, then by y.
+    sorted: Vec<Candidate>,
+    tolerance: f64,
+}
+
+impl Candidates {
+    fn new(a: &Topology, b: &Topology, turned: &[Vector2<f64>], tolerance: f64) -> Self {
+        let mut found = Vec::new();
+        let paths_a: Vec<[usize; 2]> = a.long_paths(tolerance).collect();
+        for [start, end] in b.long_paths(tolerance) {
+            let along = turned[end] - turned[start];
+            for ends in &paths_a {
+                let [first, second] = ends.map(|node| a.nodes[node].coords);
+                let across = second - first;
+                let mut add = |start: usize, end: usize| {
+                    found.push(Candidate { first: first - turned[start], second: second - turned[end] });
+                };
+                if (across - along).norm() <= 2.0 * tolerance {
+                    add(start, end);
+                }
+                if (across + along).norm() <= 2.0 * tolerance {
+                    add(end, start);
+                }
             }
         }
+        found.sort_by(|one, other| {
+            let by_column = column(one.middle().x, tolerance).cmp(&column(other.middle().x, tolerance));
+            by_column.then(one.middle().y.total_cmp(&other.middle().y))
+        });
+        Self { sorted: found, tolerance }
     }
-    found.sort_by(|one, other| one.middle_x().total_cmp(&other.middle_x()));
-    found
+
+    /// Counts the paths that coincide at a translation.
+    fn trial(&self, translation: Vector2<f64>) -> Trial {
+        let mut trial = Trial { translation, similarity: 0, distance: 0.0 };
+        let most = self.tolerance * self.tolerance;
+        // If both ends are within the tolerance, so is their midpoint.
+        let [left, right] = [-1.0, 1.0].map(|side| column(translation.x + side * self.tolerance, self.tolerance));
+        for at in [Some(left), (right > left).then_some(right)].into_iter().flatten() {
+            for candidate in self.between(at, translation.y - self.tolerance, translation.y + self.tolerance) {
+                let first = (candidate.first - translation).norm_squared();
+                let second = (candidate.second - translation).norm_squared();
+                if first <= most && second <= most {
+                    trial.similarity += 1;
+                    trial.distance += first + second;
+                }
+            }
+        }
+        trial
+    }
+
+    /// The candidates of a column from one y to another.
+    fn between(&self, at: i64, lowest: f64, highest: f64) -> impl Iterator<Item = &Candidate> {
+        let start = self.sorted.partition_point(|candidate| {
+            let middle = candidate.middle();
+            let by_column = column(middle.x, self.tolerance).cmp(&at);
+            by_column.then(middle.y.total_cmp(&lowest)).is_lt()
+        });
+        let is_within = move |candidate: &&Candidate| {
+            column(candidate.middle().x, self.tolerance) == at && candidate.middle().y <= highest
+        };
+        self.sorted[start..].iter().take_while(is_within)
+    }
+}
+
+/// The column of an x: columns are as wide as what lies within the tolerance of a point.
+fn column(x: f64, tolerance: f64) -> i64 {
+    (x / (2.0 * tolerance)).floor() as i64
 }
 
 impl Candidate {
-    fn middle_x(&self) -> f64 {
-        0.5 * (self.first.x + self.second.x)
+    fn middle(&self) -> Vector2<f64> {
+        0.5 * (self.first + self.second)
     }
-}
-
-/// Counts the paths that coincide at a translation.
-fn trial(translation: Vector2<f64>, candidates: &[Candidate], tolerance: f64) -> Trial {
-    let mut trial = Trial { translation, similarity: 0, distance: 0.0 };
-    // If both ends are within the tolerance, so is their midpoint.
-    let start = candidates.partition_point(|candidate| candidate.middle_x() < translation.x - tolerance);
-    let near = candidates[start..].iter().take_while(|candidate| candidate.middle_x() <= translation.x + tolerance);
-    let most = tolerance * tolerance;
-    for candidate in near {
-        let first = (candidate.first - translation).norm_squared();
-        let second = (candidate.second - translation).norm_squared();
-        if first <= most && second <= most {
-            trial.similarity += 1;
-            trial.distance += first + second;
-        }
-    }
-    trial
 }
