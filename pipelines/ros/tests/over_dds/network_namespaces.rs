@@ -35,6 +35,8 @@ fn network_namespaces_of_robots_and_a_merge_find_each_other_by_multicast() {
         serde_json::from_str(&std::fs::read_to_string(folder.join("seen.json")).unwrap()).unwrap();
     assert_eq!((&seen["map"]["frame"], &seen["publisher"][0]), (&"world".into(), &"gridweave_ros".into()), "{seen}");
     let text = std::fs::read_to_string(folder.join("merging.txt")).unwrap();
-    assert!(!text.contains("warning"), "{text}");
+    // Where the machine is busy, the robots start late, and the run rightly says that it hears none so far.
+    let is_unexpected = |line: &str| line.starts_with("warning") && !line.contains("nobody publishes");
+    assert!(!text.lines().any(is_unexpected), "{text}");
     run(GRIDWEAVE, &["evaluate", "summary.json", "--truth", "in.truth.json"], folder);
 }
