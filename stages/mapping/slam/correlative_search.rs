@@ -5,7 +5,7 @@ use crate::shared::geometry::{Point2, Pose2, pose, wrap_angle};
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// Margin of the likelihood field around the points, metres: the reach of a wall in it.
-const MARGIN: f64 = 0.3;
+pub(super) const MARGIN: f64 = 0.3;
 
 /// What is known of a pose before the search.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! Loop closures: submaps that were seen before.
 
-use super::correlative_search::{Excluded, PosePrior, search};
+use super::correlative_search::{Excluded, MARGIN, PosePrior, search};
 use super::local_map::LocalMap;
 use super::pose_graph::{Constraint, PoseGraph, turned_information};
 use super::scan_points::ScanPoint;
@@ -31,9 +31,9 @@ pub(super) const OTHER_PLACE: [f64; 2] = [0.5, 0.15];
 const UNCERTAIN: f64 = 0.5;
 /// Share of the information of a registration that a closure has: the submaps are bent themselves.
 const INFORMATION_SHARE: f64 = 0.3;
-/// Shift by which it is seen whether walls show where along them a submap is, metres, and the least evidence that is lost by it:
-/// a standard deviation of seven metres.
-const SLIDE: f64 = 0.3;
+/// Shift by which it is seen whether walls show where along them a submap is, metres: no more than the likelihood field has walls
+/// beside the window. And the least evidence that is lost by it: a standard deviation of seven metres.
+const SLIDE: f64 = MARGIN;
 const LEAST_LOST: f64 = 1e-3;
 /// Information on a pose of which nothing else is known, so that it has a covariance.
 const LEAST_INFORMATION: f64 = 1e-6;
