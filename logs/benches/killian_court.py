@@ -82,6 +82,8 @@ def main():
     parser.add_argument("--seed", type=int, default=5)
     arguments = parser.parse_args()
     start, measurements, ranges = read(arguments.graph)
+    if not 0 < len(start) == len(ranges):
+        parser.error(f"{arguments.graph} has {len(start)} poses and {len(ranges)} scans: each pose of killian.g2o has a scan")
     truth = solved(start, measurements)
     steps = {}
     for a, b, (x, y, yaw), _ in measurements:
