@@ -72,29 +72,15 @@ impl<'a> PlacedLayer<'a> {
         })
     }
 
-    /// The coverage of the pixel in column `u` and row `v`.
-    pub(super) fn coverage(&self, view: &View, u: usize, v: usize) -> Coverage {
-        let samples = view.samples_per_side;
-        let step = 1.0 / samples as f64;
+    /// The grid of samples of the pixels of a view.
+    pub(super) fn samples(&self, view: &View) -> PixelSamples<'_> {
         let to_grid =
             |u: f64, v: f64| self.transform_world_grid.inverse_transform_point(&view.world(u, v)) / self.resolution;
-        let (u, v) = (u as f64 + 0.5 * step, v as f64 + 0.5 * step);
-        let first = to_grid(u, v);
-        let across: Vector2<f64> = to_grid(u + step, v) - first;
-        let down: Vector2<f64> = to_grid(u, v + step) - first;
-
-        let (mut walls, mut free) = (0u32, 0u32);
-        for i in 0..samples {
-            for j in 0..samples {
-                let cell = self.cell(first + across * i as f64 + down * j as f64);
-                walls += u32::from(is_occupied(cell));
-                free += u32::from(is_free(cell));
-            }
-        }
-        let count = (samples * samples) as f64;
-        // A wall is one cell wide and must stay visible when cells are smaller than pixels.
-        let wall = (2.0 * f64::from(walls) / count).min(1.0);
-        Coverage { wall, free: f64::from(free) / (count - f64::from(walls)).max(1.0) }
+        let per_side = view.samples_per_side;
+        let half = 0.5 / per_side as f64;
+        let corner = to_grid(0.0, 0.0);
+        let (right, down) = (to_grid(1.0, 0.0) - corner, to_grid(0.0, 1.0) - corner);
+        PixelSamples { layer: self, first: corner + half * (right + down), right, down, per_side }
     }
 
     /// The cell at a position in cells; unknown outside of the map.
@@ -104,5 +90,41 @@ impl<'a> PlacedLayer<'a> {
         }
         let index = (place.y as usize).checked_mul(self.width).and_then(|row| row.checked_add(place.x as usize));
         index.and_then(|index| self.cells.get(index)).copied().unwrap_or(UNKNOWN)
+    }
+}
+
+/// Where the samples of the pixels of a view lie on a map.
+pub(super) struct PixelSamples<'a> {
+    layer: &'a PlacedLayer<'a>,
+    /// The first sample of the pixel in column 0 and row 0, cells.
+    first: Point2<f64>,
+    /// The way from a pixel to the next one of its row and of its column, cells.
+    right: Vector2<f64>,
+    down: Vector2<f64>,
+    /// The number of samples along each side of a pixel.
+    per_side: usize,
+}
+
+impl PixelSamples<'_> {
+    /// The coverage of the pixel in column `u` and row `v`.
+    pub(super) fn coverage(&self, u: usize, v: usize) -> Coverage {
+        let step = 1.0 / self.per_side as f64;
+        let first = self.first + self.right * u as f64 + self.down * v as f64;
+        let (mut walls, mut free) = (0u32, 0u32);
+        for i in 0..self.per_side {
+            let column = first + self.right * (i as f64 * step);
+            for j in 0..self.per_side {
+                let cell = self.layer.cell(column + self.down * (j as f64 * step));
+                walls += u32::from(is_occupied(cell));
+                free += u32::from(is_free(cell));
+            }
+        }
+        if walls + free == 0 {
+            return Coverage::default();
+        }
+        let count = (self.per_side * self.per_side) as f64;
+        // A wall is one cell wide and must stay visible when cells are smaller than pixels.
+        let wall = (2.0 * f64::from(walls) / count).min(1.0);
+        Coverage { wall, free: f64::from(free) / (count - f64::from(walls)).max(1.0) }
     }
 }

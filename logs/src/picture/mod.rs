@@ -28,7 +28,7 @@ use crate::drawing::Drawing;
 use crate::file::replace_or_leave;
 use colour::{FREE, OCCUPIED, UNKNOWN};
 use image::RgbImage;
-use layer::{Coverage, PlacedLayer};
+use layer::{Coverage, PixelSamples, PlacedLayer};
 use rayon::prelude::*;
 use std::path::Path;
 use view::View;
@@ -132,11 +132,12 @@ fn render(
 
     let mut image = RgbImage::from_pixel(view.width, view.height, UNKNOWN);
     let row = view.width as usize * 3;
+    let samples: Vec<PixelSamples<'_>> = layers.iter().map(|layer| layer.samples(&view)).collect();
     image.par_chunks_exact_mut(row.max(1)).enumerate().for_each(|(v, pixels)| {
         let mut shares = vec![Coverage::default(); layers.len()];
         for (u, pixel) in pixels.chunks_exact_mut(3).enumerate() {
-            for (share, layer) in shares.iter_mut().zip(&layers) {
-                *share = layer.coverage(&view, u, v);
+            for (share, samples) in shares.iter_mut().zip(&samples) {
+                *share = samples.coverage(u, v);
             }
             pixel.copy_from_slice(&paint(&shares).0);
         }
