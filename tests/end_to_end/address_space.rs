@@ -1,7 +1,7 @@
 //! Too little address space (`ulimit -v`): a run that cannot keep the limit is refused, and what was there before
 //! stays.
 
-use crate::support::{Ended, LogBuilder, TestMap, gridweave_program, part, simulate, start_program};
+use crate::support::{Ended, LogBuilder, SMALL_BUILDING, TestMap, gridweave_program, part, simulate, start_program};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
@@ -39,7 +39,7 @@ fn a_run_of_threads_within_too_little_address_space_is_refused_and_says_what_to_
 #[test]
 fn a_run_in_one_thread_works_within_little_address_space_or_is_refused() {
     let folder = TempDir::new().unwrap();
-    simulate(folder.path(), "input.mcap", &["--robots", "2"]);
+    simulate(folder.path(), "input.mcap", &SMALL_BUILDING);
     for kilobytes in [100_000, 140_000, 180_000, 200_000, 230_000, 260_000, 300_000, 350_000, 400_000, 500_000] {
         let ended = run_merge_within(folder.path(), &kilobytes.to_string(), "single");
         match kilobytes < 128 << 10 {
