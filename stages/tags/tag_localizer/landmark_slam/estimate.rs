@@ -7,6 +7,7 @@ use super::keyframes::Keyframes;
 use super::located_tags::{LocatedTags, located};
 use super::search::{readings_by_tag, search};
 use super::step::OdometryDrift;
+use rayon::prelude::*;
 use std::cmp::Ordering;
 
 /// Drifts that are assumed while the estimate grows along the drive: that of a robot with a good gyroscope, of one with
@@ -33,8 +34,8 @@ const MORE_READINGS: f64 = 1.4;
 
 /// Locates the tags of a drive, and the drive with them if its odometry drifts. `None` if no tag is located.
 pub(in super::super) fn locate(keyframes: &Keyframes, parameters: &TagLocalizerParameters) -> Option<LocatedTags> {
-    let grown = FIRST_DRIFTS.iter().filter_map(|&drift| along_the_drive(keyframes, parameters, drift));
-    let best = grown.reduce(|best, next| {
+    let grown = FIRST_DRIFTS.par_iter().map(|&drift| along_the_drive(keyframes, parameters, drift));
+    let best = grown.collect::<Vec<_>>().into_iter().flatten().reduce(|best, next| {
         // Those with more tags explain more readings.
         let located = |graph: &LandmarkGraph<'_>| graph.tags.iter().flatten().count();
         match located(&next).cmp(&located(&best)) {
