@@ -83,9 +83,13 @@ class RobotLog:
         self.truths = self.writer.register_msgdef("geometry_msgs/msg/PoseStamped", POSE_STAMPED)
         self.odometries = self.writer.register_msgdef("nav_msgs/msg/Odometry", ODOMETRY)
 
+    def time(self):
+        """The time of the next scan, nanoseconds."""
+        return START + int(self.number / self.rate * 1e9)
+
     def write(self, pose, odometry, ranges):
         """Writes a scan, the true pose at it (x, y, yaw), and that by odometry, if there is one. What is beyond the range is no hit."""
-        time = START + int(self.number / self.rate * 1e9)
+        time = self.time()
         self.number += 1
         stamp = {"sec": time // 10**9, "nanosec": time % 10**9}
         truth = {"header": {"stamp": stamp, "frame_id": "building"}, "pose": pose_message(*pose)}

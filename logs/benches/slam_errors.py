@@ -4,7 +4,7 @@
 
 The folder has `NAME.mcap` (`/robot1/scan` and `/robot1/odom`; `/robot2/...` in the second halves) and `NAME.csv` (time in seconds, the corrected
 pose, the pose by odometry: x, y, yaw each) for the names below. Errors are distances after rigid alignment, metres. `--only` measures
-some of the parts: alone, together, simulated, pairs, corridors. It needs `mcap-ros2-support` and numpy of PyPI.
+some of the parts: alone, together, whole, dealt, simulated, pairs, corridors. It needs `mcap-ros2-support` and numpy of PyPI.
 """
 
 import argparse
@@ -17,6 +17,7 @@ from itertools import chain
 from pathlib import Path
 
 import numpy as np
+from public_drives import Drive, spread
 from trajectory_error import distances, poses, rms
 
 ALONE = ["intel-robot1", "intel-robot2", "csail-robot1", "csail-robot2", "exp1", "exp2"]
@@ -32,7 +33,8 @@ SINGLE = [
 PAIRS = range(660, 668)
 LIDARS = ["--beams 360 --range 30", "--beams 360 --range 8", "--beams 36 --range 30"]
 CORRIDORS = [("bare, by scans alone", ""), ("with door frames, by scans alone", "--doors"), ("bare, with odometry", "--odometry")]
-PARTS = ["alone", "together", "simulated", "pairs", "corridors"]
+ROBOTS = [2, 3, 4]
+PARTS = ["alone", "together", "whole", "dealt", "simulated", "pairs", "corridors"]
 # Two robots have met where they are nearer to each other than this, metres.
 MEETING = 1.0
 # The exit status of a run in which a robot could not be merged.
@@ -143,6 +145,37 @@ def between(a, b):
     return cosine * x + sine * y, cosine * y - sine * x, b[2] - a[2]
 
 
+def whole(bench, public, name):
+    """Both halves of a log as one drive, and over how many cells its hits are spread, against those at the true poses."""
+    log = bench.file(f"{name}-whole.mcap")
+    angles, scans = Drive(public, name).write(log)
+    output = bench.merged(log)
+    truth, estimated = {time: pose for time, (pose, _) in scans.items()}, poses(bench.gridweave, output, "/robot1/matched_pose")
+    wider = spread(angles, scans, estimated) / spread(angles, scans, truth) - 1
+    return [f"{shown(f'{name}, whole', *bench.errors(output, truth))} {wider:+.0%} cells |"]
+
+
+def dealt(bench, public, name):
+    """A drive dealt out to robots that drive one after the other: how many are merged, and the error of all in one frame."""
+    drive = Drive(public, name)
+    return [dealt_to(bench, drive, name, robots) for robots in ROBOTS]
+
+
+def dealt_to(bench, drive, name, robots):
+    names = [f"robot{number + 1}" for number in range(robots)]
+    logs = [bench.file(f"{name}-{robots}-{robot}.mcap") for robot in names]
+    truths = [drive.write(log, number, robots)[1] for number, log in enumerate(logs)]
+    output = bench.file(f"{name}-{robots}.merged.mcap")
+    bench.run("merge", *(f"{robot}={log}" for robot, log in zip(names, logs)), "-o", output, "--summary", output + ".json")
+    frames, estimated, true = merged_frames(output + ".json"), {}, {}
+    for robot, truth in zip(names, truths):
+        if robot in frames:
+            matched = poses(bench.gridweave, output, f"/{robot}/matched_pose")
+            estimated |= {(robot, time): compose(frames[robot], pose) for time, pose in matched.items()}
+            true |= {(robot, time): pose for time, (pose, _) in truth.items()}
+    return f"{shown(f'{name}, {robots} robots', distances(estimated, true))} {len(frames)} of {robots} merged |"
+
+
 def simulated(bench, kind):
     name, seeds, lidar = kind
     found = []
@@ -193,11 +226,11 @@ def main():
     unknown = set(parts) - set(PARTS)
     if unknown:
         parser.error(f"there is no part {', '.join(sorted(unknown))}: the parts are {', '.join(PARTS)}")
-    if arguments.only != ",".join(PARTS) and not arguments.public and {"alone", "together"} & set(parts):
-        parser.error("`alone` and `together` need --public FOLDER")
+    if arguments.only != ",".join(PARTS) and not arguments.public and set(PARTS[:4]) & set(parts):
+        parser.error("public logs need --public FOLDER")
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(arguments.workers) as pool:
         bench = Bench(arguments.gridweave, Path(folder))
-        public = {"alone": (alone, ALONE), "together": (together, HALVES)} if arguments.public else {}
+        public = {"alone": (alone, ALONE), **{part.__name__: (part, HALVES) for part in (together, whole, dealt)}} if arguments.public else {}
         for part, (measure, names) in public.items():
             if part in parts:
                 print_rows(pool.map(lambda name: measure(bench, arguments.public, name), names))
