@@ -9,8 +9,9 @@ import numpy as np
 from mcap_ros2.reader import read_ros2_messages
 from robot_log import RobotLog
 
-# Scans that two robots have in common would make their maps agree too well: those of an overlap are dealt out in turn.
-OVERLAP = 0.125
+# Share of a robot's part that the next one sees, too: scans that two have in common would make their maps agree too well, so those
+# of an overlap are dealt out in turn.
+OVERLAP = 0.5
 # Hits that are farther away, metres, are spread by the least error of the yaw.
 LONGEST_HIT = 20.0
 CELL = 0.05
@@ -26,7 +27,7 @@ class Drive:
 
     def part(self, number, of):
         """The steps of one of some robots that drive one after the other, and what of the others' they see as well, by their numbers."""
-        overlap = OVERLAP * len(self.steps) / 2
+        overlap = OVERLAP * len(self.steps) / of / 2
         start, end = (len(self.steps) * share / of for share in (number, number + 1))
         first, last = (start - overlap if number > 0 else 0), (end + overlap if number + 1 < of else len(self.steps))
         for at, step in enumerate(self.steps):

@@ -37,6 +37,13 @@ pub(super) fn lost_way(name: &str, seconds: f64, cause: LossCause) -> String {
             format!("nothing shows how it moved in the {pause:.1} s before, and its scans lie on no earlier ones"),
             CUT_THERE.to_owned(),
         ),
+        LossCause::ScanGap { seconds, deviation } => (
+            format!(
+                "it has no scans of the {seconds:.1} s before, by odometry it may be {deviation:.1} m off (standard deviation), and \
+                 its scans lie on no earlier ones"
+            ),
+            CUT_THERE.to_owned(),
+        ),
         LossCause::ParallelWalls => (
             "it has no odometry, and its scans do not show how it moved along walls that are bare and parallel"
                 .to_owned(),

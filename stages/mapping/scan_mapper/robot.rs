@@ -16,6 +16,9 @@ use std::collections::VecDeque;
 const PATIENCE: f64 = 10.0;
 /// Standard deviations of the motion of a robot in a pause in which nothing shows it, metres and radians.
 const UNSEEN_MOTION: [f64; 2] = [0.5, 0.5];
+/// Least time without a scan, seconds and in usual intervals between scans, that is a gap.
+const LEAST_GAP: f64 = 1.0;
+const LEAST_INTERVALS: f64 = 3.0;
 
 /// Source of the robot's poses.
 enum Localization {
@@ -55,6 +58,8 @@ pub(super) struct Robot {
     /// The frame of the poses.
     pub(super) frame: Option<String>,
     waiting: VecDeque<(LogTime, ScanBeams)>,
+    /// Those whose poses by odometry were looked up.
+    looked_up: ScanTimes,
     /// Tags that were seen, for which no pose is known so far.
     waiting_tags: VecDeque<(LogTime, TagSighting)>,
     first_scan: Option<LogTime>,
@@ -79,6 +84,7 @@ impl Robot {
             kept_odometry: Vec::new(),
             frame: None,
             waiting: VecDeque::new(),
+            looked_up: ScanTimes::default(),
             waiting_tags: VecDeque::new(),
             first_scan: None,
             scans: 0,
@@ -246,7 +252,7 @@ impl Robot {
                 self.kept_odometry.push((time, at));
                 self.odometry.add(time, position(&at));
                 let is_due = slam.is_due(time, &at, parameters);
-                let is_matched = !is_due || slam.add(time, &at, &scan);
+                let is_matched = !is_due || slam.add(time, &at, &at, &scan);
                 outcome(if is_matched { ScanOutcome::Used } else { ScanOutcome::NotMatched });
             }
         } else {
@@ -287,8 +293,8 @@ impl Robot {
                     drawn
                 }
                 Localization::ByOdometry(slam) => {
-                    let blind = self.continuous.blind_pause();
-                    add_to_slam(slam, &self.odometry, blind, (time, &scan), parameters)
+                    let pauses = Pauses { blind: self.continuous.blind_pause(), of_scans: self.looked_up.gap(time) };
+                    add_to_slam(slam, &self.odometry, pauses, (time, &scan), parameters)
                 }
             });
         }
@@ -343,12 +349,39 @@ fn draw_by_poses(
     }
 }
 
-/// Adds a scan at its pose by odometry, where `blind` is the last pause in which nothing shows how the robot moved, with
-/// its length in seconds.
+/// Times of the scans of a robot so far.
+#[derive(Clone, Copy, Debug, Default)]
+struct ScanTimes {
+    first: Option<LogTime>,
+    last: Option<LogTime>,
+    intervals: f64,
+}
+
+impl ScanTimes {
+    /// Seconds without a scan before the next one, if they are a gap.
+    fn gap(&mut self, time: LogTime) -> Option<f64> {
+        let first = *self.first.get_or_insert(time);
+        let last = self.last.replace(time)?;
+        let (seconds, before) = (time.seconds_since(last), last.seconds_since(first));
+        let is_gap = seconds > LEAST_GAP && seconds * self.intervals > LEAST_INTERVALS * before;
+        self.intervals += 1.0;
+        is_gap.then_some(seconds)
+    }
+}
+
+/// Pauses before a scan.
+struct Pauses {
+    /// The last one in which nothing shows how the robot moved: its end, and its length in seconds.
+    blind: Option<(LogTime, f64)>,
+    /// Seconds without a scan.
+    of_scans: Option<f64>,
+}
+
+/// Adds a scan at its pose by odometry. If that is not known well enough, the robot has lost its way unless its scan shows it.
 fn add_to_slam(
     slam: &mut SlamMap,
     odometry: &PoseTrack,
-    blind: Option<(LogTime, f64)>,
+    pauses: Pauses,
     (time, scan): (LogTime, &ScanBeams),
     parameters: &ScanMapperParameters,
 ) -> ScanOutcome {
@@ -359,18 +392,31 @@ fn add_to_slam(
     // The relative poses of the beams of one scan are those of odometry.
     let still =
         || scan.without_motion(|delay| Some(start.inv_mul(&pose_at(odometry, time.plus_seconds(delay), parameters)?)));
-    let pause = blind.filter(|(end, _)| *end <= time && slam.last_time().is_some_and(|last| last < *end));
-    if let Some((end, pause)) = pause
-        && !slam
-            .locate(&start, UNSEEN_MOTION, &still())
-            .is_some_and(|located| located.is_sure && located.deviation <= parameters.step)
-    {
-        slam.lose_way(end, LossCause::Pause(pause));
+    let mut guess = start;
+    if let Some((deviations, lost)) = unseen_motion(slam, &pauses, time, &start) {
+        let located = slam.relocate(&start, deviations, &still());
+        match located.filter(|located| located.is_sure && located.deviation <= parameters.step) {
+            Some(located) => guess = located.pose,
+            None => slam.lose_way(lost),
+        }
     }
     if !slam.is_due(time, &start, parameters) {
         return ScanOutcome::Used;
     }
-    if slam.add(time, &start, &still()) { ScanOutcome::Used } else { ScanOutcome::NotMatched }
+    if slam.add(time, &start, &guess, &still()) { ScanOutcome::Used } else { ScanOutcome::NotMatched }
+}
+
+/// The standard deviations of the motion up to a scan, metres and radians, if it is as uncertain as one that nothing shows; and where
+/// the robot has then lost its way.
+fn unseen_motion(slam: &SlamMap, pauses: &Pauses, time: LogTime, odometry: &Pose2) -> Option<([f64; 2], LostWay)> {
+    let is_since_last = |end: LogTime| end <= time && slam.last_time().is_some_and(|last| last < end);
+    if let Some((end, seconds)) = pauses.blind.filter(|(end, _)| is_since_last(*end)) {
+        return Some((UNSEEN_MOTION, LostWay { time: end, cause: LossCause::Pause(seconds) }));
+    }
+    let seconds = pauses.of_scans?;
+    let deviations = slam.deviations_after_gap(seconds, odometry);
+    let lost = LostWay { time, cause: LossCause::ScanGap { seconds, deviation: deviations[0] } };
+    (deviations[0] > UNSEEN_MOTION[0]).then_some((deviations, lost))
 }
 
 fn position(pose: &Pose2) -> Position {

@@ -1,6 +1,6 @@
 //! Odometry from the scans alone, for robots that have no other.
 
-use super::slam_map::{LossCause, SlamMap};
+use super::slam_map::{LossCause, LostWay, SlamMap};
 use super::{ScanBeams, ScanMapperParameters};
 use crate::shared::geometry::{Pose2, pose};
 use gridweave_runtime::message::LogTime;
@@ -49,11 +49,13 @@ impl ScanOdometry {
         let deviations = [0, 1].map(|axis| LEAST_DEVIATIONS[axis] + ACCELERATION[axis] * gap.min(LONGEST_GAP).powi(2));
         let located = slam.locate(&guess, deviations, scan);
         if gap > LONGEST_GAP && !located.is_some_and(|located| located.is_sure) {
-            slam.lose_way(time, LossCause::Pause(gap));
+            slam.lose_way(LostWay { time, cause: LossCause::Pause(gap) });
         }
         match located {
             Some(located) if located.deviation <= parameters.step => self.seen = Some(time),
-            Some(_) if time.seconds_since(seen) > LONGEST_GAP => slam.lose_way(seen, LossCause::ParallelWalls),
+            Some(_) if time.seconds_since(seen) > LONGEST_GAP => {
+                slam.lose_way(LostWay { time: seen, cause: LossCause::ParallelWalls });
+            }
             _ => {}
         }
         // Where the scan lies on no other one, the robot is taken to go on as it did.

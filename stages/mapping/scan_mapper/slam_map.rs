@@ -56,6 +56,8 @@ pub(super) struct LostWay {
 pub(super) enum LossCause {
     /// Nothing shows how it moved in a pause of so many seconds before, and its scans lie on no earlier ones.
     Pause(f64),
+    /// Nothing but odometry does, which is uncertain by so many metres.
+    ScanGap { seconds: f64, deviation: f64 },
     /// It has no odometry, and its scans show walls of one direction only, as in a bare corridor.
     ParallelWalls,
 }
@@ -106,8 +108,8 @@ impl SlamMap {
     }
 
     /// Leaves out all later scans: where they were made is not known.
-    pub(super) fn lose_way(&mut self, time: LogTime, cause: LossCause) {
-        self.lost_way.get_or_insert(LostWay { time, cause });
+    pub(super) fn lose_way(&mut self, lost: LostWay) {
+        self.lost_way.get_or_insert(lost);
     }
 
     /// Where the robot has lost its way.
@@ -137,9 +139,20 @@ impl SlamMap {
             })
     }
 
-    /// Adds a scan that was made at the pose `odometry`, without motion. Returns whether it lies on the earlier ones.
-    pub(super) fn add(&mut self, time: LogTime, odometry: &Pose2, scan: &ScanBeams) -> bool {
-        let moved = self.scans.last().map_or_else(Pose2::identity, |last| last.odometry.inv_mul(odometry));
+    /// Standard deviations of position and yaw, metres and radians, of the motion since the last scan of a robot that is at the
+    /// pose `odometry` after so many seconds without any: in these it has driven as far as in the mean, if not farther.
+    pub(super) fn deviations_after_gap(&self, seconds: f64, odometry: &Pose2) -> [f64; 2] {
+        let (Some(first), Some(last)) = (self.scans.first(), self.scans.last()) else { return [0.0; 2] };
+        let driven = last.time.seconds_since(first.time);
+        let speed = if driven > 0.0 { self.trajectory.path() / driven } else { 0.0 };
+        let way = last.odometry.inv_mul(odometry).translation.vector.norm();
+        self.trajectory.deviations_of_way(way.max(speed * seconds))
+    }
+
+    /// Adds a scan that was made at the pose `odometry`, without motion, and is expected at the pose `guess` in the same frame.
+    /// Returns whether it lies on the earlier ones.
+    pub(super) fn add(&mut self, time: LogTime, odometry: &Pose2, guess: &Pose2, scan: &ScanBeams) -> bool {
+        let moved = self.scans.last().map_or_else(Pose2::identity, |last| last.odometry.inv_mul(guess));
         let before = self.trajectory.unmatched();
         let lidar = scan.transform_base_lidar.translation.vector.into();
         if self.trajectory.add(&moved, points(scan), lidar) {
@@ -173,6 +186,13 @@ impl SlamMap {
     pub(super) fn locate(&self, guess: &Pose2, deviations: [f64; 2], scan: &ScanBeams) -> Option<LocatedScan> {
         let last = self.scans.last()?.odometry;
         let found = self.trajectory.locate(&last.inv_mul(guess), deviations, &points(scan))?;
+        Some(LocatedScan { pose: last * found.pose, ..found })
+    }
+
+    /// Registers a scan likewise where it lies at one place alone, of all at which it may be. `None` if it lies nowhere, or at several.
+    pub(super) fn relocate(&self, guess: &Pose2, deviations: [f64; 2], scan: &ScanBeams) -> Option<LocatedScan> {
+        let last = self.scans.last()?.odometry;
+        let found = self.trajectory.relocate(&last.inv_mul(guess), deviations, &points(scan))?;
         Some(LocatedScan { pose: last * found.pose, ..found })
     }
 

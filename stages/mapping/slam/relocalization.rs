@@ -4,16 +4,22 @@
 //! it may fit into others as well, which the search of one alone does not see. So the scans of its last metres are searched in
 //! all submaps at once, within all that is uncertain. Where most of them fit at one place alone, and no beams pass through
 //! walls there, the robot has been there: what looks alike is seldom alike all along such a way.
+//!
+//! After a gap in which nothing shows well how the robot has moved, its next scan is searched likewise in the map around it.
 
 use super::contradictions::{MAX_CONTRADICTING, PlacedScan, find_contradictions};
 use super::correlative_search::{Excluded, PosePrior, search};
 use super::likelihood_field::LikelihoodField;
+use super::local_map::LocalMap;
 use super::loop_closure::{Candidate, LEAST_WINDOW, OTHER_PLACE, Revisit, WINDOW, find_closures, middle};
+use super::point_to_line::Match;
 use super::pose_graph::{Constraint, turned_information};
+use super::scan_points::ScanPoint;
 use super::scan_registration::{GAIN, thinned};
 use crate::shared::geometry::{Point2, Pose2};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeSet;
+use std::f64::consts::PI;
 
 /// Least mean likelihood of the points at a place where the robot may be: much that was not seen looks alike.
 const LEAST_RESPONSE: f64 = 0.7;
@@ -84,15 +90,33 @@ fn find_place(revisit: &Revisit<'_>, candidates: &[Candidate], earlier: &[usize]
     let prior = PosePrior { mean: poses[scan], information, window: [x, y, yaw] };
     let walls = earlier.iter().flat_map(|&scan| revisit.scans[scan].iter().map(move |point| poses[scan] * point.place));
     let field = LikelihoodField::new(walls, &prior.reach(&searched), x.max(y));
-    let found = search(&field, &searched, &prior, GAIN, LEAST_RESPONSE, None)?;
+    find_only_place(&field, &searched, &prior, LEAST_RESPONSE)
+}
+
+/// The pose at which points fit into a field, with at least a mean likelihood. `None` if they fit nowhere, or at several places.
+fn find_only_place(field: &LikelihoodField, points: &[Point2], prior: &PosePrior, least: f64) -> Option<Pose2> {
+    let found = search(field, points, prior, GAIN, least, None)?;
     let excluded = Excluded { pose: found.pose, distance: OTHER_PLACE[0], turn: OTHER_PLACE[1] };
     // What has fewer points on walls is less likely whatever the prior says.
-    let least = (found.score - LEAST_LEAD) / (GAIN * searched.len() as f64);
-    let other = search(&field, &searched, &prior, GAIN, least, Some(&excluded));
-    if other.is_some_and(|other| other.score > found.score - LEAST_LEAD) {
+    let least = (found.score - LEAST_LEAD) / (GAIN * points.len() as f64);
+    let other = search(field, points, prior, GAIN, least, Some(&excluded));
+    other.is_none_or(|other| other.score <= found.score - LEAST_LEAD).then_some(found.pose)
+}
+
+/// Registers a scan on a map where it fits at one place alone, of all at which it may be. `guess` is its pose as it is expected, with
+/// the standard deviations of its position and yaw, metres and radians. `None` if it fits nowhere, or at several places.
+pub(super) fn relocate(map: &LocalMap, points: &[ScanPoint], guess: &Pose2, deviations: [f64; 2]) -> Option<Match> {
+    let [place, yaw] = deviations.map(|deviation| WINDOW * deviation);
+    // Written so that a value that is not a number fails it.
+    if !(place <= LARGEST_WINDOW[0]) {
         return None;
     }
-    Some(found.pose)
+    let information = Vector3::new(deviations[0], deviations[0], deviations[1]).map(|deviation| deviation.powi(-2));
+    let information = Matrix3::from_diagonal(&information);
+    let prior = PosePrior { mean: *guess, information, window: [place, place, yaw.min(PI)] };
+    let searched = thinned(points, SEARCHED_POINTS);
+    let found = find_only_place(&map.field(&searched, &prior), &searched, &prior, 0.0)?;
+    Some(map.register(points, &found, (guess, &information)))
 }
 
 /// Whether the scans of the last metres contradict earlier ones, or these them, where the last submap is at a pose.
@@ -129,7 +153,6 @@ mod tests {
     use super::*;
     use crate::mapping::slam::loop_closure::Drive;
     use crate::mapping::slam::pose_graph::PoseGraph;
-    use crate::mapping::slam::scan_points::ScanPoint;
     use crate::shared::geometry::{Point2, pose};
     use nalgebra::Vector2;
     use std::ops::Range;

@@ -20,8 +20,9 @@ const LARGEST_WINDOW: [f64; 2] = [2.0, 1.0];
 pub(super) const WELL_MATCHED: f64 = 0.6;
 /// The wider window, at least, metres and radians.
 const SLIP_WINDOW: [f64; 2] = [0.5, 0.7];
-/// How much more of the points must match for a pose in the wider window.
-const SLIP_GAIN: f64 = 0.2;
+/// How much more of the points must match for a pose that odometry does not expect.
+pub(super) const SLIP_GAIN: f64 = 0.2;
+
 /// A scan on a map.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RegisteredScan {

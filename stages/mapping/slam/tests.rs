@@ -87,6 +87,25 @@ fn error(poses: &[Pose2], truth: &[Pose2]) -> f64 {
 }
 
 #[test]
+fn a_pose_by_odometry_that_is_late_turns_only_its_own_scan() {
+    let walls = walls();
+    let mut random = ChaCha8Rng::seed_from_u64(4);
+    let truth: Vec<Pose2> = drive().into_iter().step_by(8).collect();
+    // As where the robot turns while it is scanned, and has turned back at the next scan.
+    let late = |(scan, at): (usize, &Pose2)| if scan % 5 == 3 { at * pose(0.0, 0.0, 0.35) } else { *at };
+    let odometry: Vec<Pose2> = truth.iter().enumerate().map(late).collect();
+    let mut trajectory = Trajectory::new(0.1);
+    for (scan_number, at) in truth.iter().enumerate() {
+        let moved = scan_number
+            .checked_sub(1)
+            .map_or_else(Pose2::identity, |before| odometry[before].inv_mul(&odometry[scan_number]));
+        trajectory.add(&moved, scan(&walls, at, &mut random), Point2::origin());
+    }
+    let off = error(trajectory.poses(), &truth);
+    assert!(off < 0.1, "{off}");
+}
+
+#[test]
 fn a_drive_around_a_block_is_closed_though_odometry_turns_too_far() {
     let (walls, truth) = (walls(), drive());
     let mut random = ChaCha8Rng::seed_from_u64(1);

@@ -5,12 +5,12 @@ use super::local_map::LocalMap;
 use super::loop_closure::{Drive, Revisit, middle};
 use super::odometry_noise::OdometryNoise;
 use super::pose_graph::{Constraint, LandmarkSighting, PoseGraph, turned_information, yaw_information};
-use super::relocalization::find_loop_closures;
+use super::relocalization::{find_loop_closures, relocate};
 use super::revisits::refine;
 use super::scan_points::ScanPoint;
-use super::scan_registration::{WELL_MATCHED, register};
+use super::scan_registration::{RegisteredScan, SLIP_GAIN, WELL_MATCHED, register};
 use super::seen_tags::SeenTags;
-use crate::shared::geometry::{Point2, Pose2};
+use crate::shared::geometry::{Point2, Pose2, pose};
 use nalgebra::{Matrix3, UnitComplex, Vector2, Vector3};
 use std::cell::OnceCell;
 use std::ops::Range;
@@ -69,6 +69,8 @@ pub struct Trajectory {
     revisited: Vec<usize>,
     is_recorded: bool,
     tags: SeenTags,
+    /// How the robot has moved up to the last scan by odometry.
+    last_move: Pose2,
     /// The local map, once it was asked for since the last change.
     local_map: OnceCell<LocalMap>,
     unmatched: usize,
@@ -89,6 +91,7 @@ impl Trajectory {
             revisited: Vec::new(),
             is_recorded: false,
             tags: SeenTags::default(),
+            last_move: Pose2::identity(),
             local_map: OnceCell::new(),
             unmatched: 0,
         }
@@ -169,6 +172,23 @@ impl Trajectory {
         self.noise.scale()
     }
 
+    /// Length of the path of the robot by odometry, metres.
+    pub fn path(&self) -> f64 {
+        self.paths.last().copied().unwrap_or_default()
+    }
+
+    /// Standard deviations of a way by odometry that is made of steps as those so far: of the position, metres, which errors of the
+    /// yaw on the way move as well, and of the yaw, radians.
+    pub fn deviations_of_way(&self, way: f64) -> [f64; 2] {
+        let steps = self.graph.poses.len().saturating_sub(1).max(1) as f64;
+        let step = (self.path() / steps).min(way);
+        let [position, yaw] = self.noise.deviations(&pose(step, 0.0, 0.0));
+        let growth = if step > 0.0 { (way / step).sqrt() } else { 1.0 };
+        let yaw = yaw * growth / YAW_SHARE.sqrt();
+        // The integral over a random walk.
+        [(position * growth).hypot(yaw * way / 3f64.sqrt()), yaw]
+    }
+
     /// Compares each scan with the walls that were seen at other times than its own.
     pub fn contradictions(&self) -> Contradictions {
         find_contradictions(&self.placed_scans(&self.graph.poses, 0).collect::<Vec<_>>(), RECENT_SCANS)
@@ -202,13 +222,11 @@ impl Trajectory {
             return false;
         };
         let moved = &self.noise.corrected(moved);
-        let guess = last * moved;
         let by_odometry = self.noise.information(moved);
-        let mut prior = turned_information(&by_odometry, &last.rotation);
-        prior.m33 *= YAW_SHARE;
-        let found = register(self.local_map(), &points, &guess, &prior, self.noise.deviations(moved));
+        let found = self.register_next(moved, &points);
+        self.last_move = *moved;
         let is_matched = found.matched >= LEAST_MATCHED;
-        let pose = if is_matched { found.pose } else { guess };
+        let pose = if is_matched { found.pose } else { last * moved };
         self.unmatched += usize::from(!is_matched);
         let by_walls = if is_matched { found.information } else { Matrix3::zeros() };
         let yaw_by_walls = YAW_OF_MAP_SHARE * yaw_information(&by_walls);
@@ -233,6 +251,26 @@ impl Trajectory {
         (is_long || to - self.submap_start >= SUBMAP_SCANS) && self.finish_submap()
     }
 
+    /// Registers the points of a robot that has moved by `moved` since the last scan. Where odometry is late or early, the last step
+    /// and this one may be wrong, one as much as the other the other way, and right together.
+    fn register_next(&self, moved: &Pose2, points: &[ScanPoint]) -> RegisteredScan {
+        let last = self.graph.poses.len() - 1;
+        let found = self.register_from(last, moved, points);
+        if found.matched >= WELL_MATCHED || last == 0 {
+            return found;
+        }
+        let by_both = self.register_from(last - 1, &(self.last_move * moved), points);
+        if by_both.matched >= WELL_MATCHED.max(found.matched + SLIP_GAIN) { by_both } else { found }
+    }
+
+    /// Registers the points of a robot that has moved by `moved` since a scan.
+    fn register_from(&self, scan: usize, moved: &Pose2, points: &[ScanPoint]) -> RegisteredScan {
+        let start = self.graph.poses[scan];
+        let mut prior = turned_information(&self.noise.information(moved), &start.rotation);
+        prior.m33 *= YAW_SHARE;
+        register(self.local_map(), points, &(start * moved), &prior, self.noise.deviations(moved))
+    }
+
     /// Adds the position at which a tag was seen, in the frame of the base at a scan, with its standard deviation, metres.
     /// Of several from one scan the first counts: they have the same errors.
     pub fn see(&mut self, scan: usize, tag: &str, place: Point2, deviation: f64) {
@@ -252,12 +290,15 @@ impl Trajectory {
         let information = Matrix3::from_diagonal(&Vector3::new(place, place, yaw));
         let information = turned_information(&information, &last.rotation);
         let found = register(self.local_map(), points, &(last * guess), &information, deviations);
-        let of_position = found.information.fixed_view::<2, 2>(0, 0).into_owned();
-        (found.matched >= LEAST_MATCHED).then(|| LocatedScan {
-            pose: last.inv_mul(&found.pose),
-            is_sure: found.matched >= WELL_MATCHED,
-            deviation: of_position.symmetric_eigenvalues().min().max(0.0).sqrt().recip(),
-        })
+        (found.matched >= LEAST_MATCHED).then(|| located(last, &found.pose, found.matched, &found.information))
+    }
+
+    /// Registers points likewise where they lie at one place alone, of all at which they may be. `None` if they lie nowhere, or at
+    /// several.
+    pub fn relocate(&self, guess: &Pose2, deviations: [f64; 2], points: &[ScanPoint]) -> Option<LocatedScan> {
+        let last = self.graph.poses.last()?;
+        let found = relocate(self.local_map(), points, &(last * guess), deviations)?;
+        Some(located(last, &found.pose, found.matched, &found.information))
     }
 
     fn push(&mut self, pose: Pose2, way: f64, points: Vec<ScanPoint>) {
@@ -385,5 +426,15 @@ impl Trajectory {
         let mut nearest: Vec<(f64, usize)> = tied.map(|submap| (distance(&submap), submap)).collect();
         nearest.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         nearest.into_iter().take(REVISITED_SUBMAPS).map(|(_, submap)| submap).collect()
+    }
+}
+
+/// A scan at a pose, of whose points a share lies on the map, with the information on its pose by its walls alone.
+fn located(last: &Pose2, pose: &Pose2, matched: f64, information: &Matrix3<f64>) -> LocatedScan {
+    let of_position = information.fixed_view::<2, 2>(0, 0).into_owned();
+    LocatedScan {
+        pose: last.inv_mul(pose),
+        is_sure: matched >= WELL_MATCHED,
+        deviation: of_position.symmetric_eigenvalues().min().max(0.0).sqrt().recip(),
     }
 }
