@@ -35,14 +35,17 @@ class Drive:
             if first <= at < last and not (in_first and at % 2 == 0) and not (in_last and at % 2 == 1):
                 yield at, step
 
-    def write(self, path, number=0, of=1):
-        """Writes the log of one of some robots, a scan a second. Returns the angles of its beams, and its true poses and ranges by time in ms."""
+    def write(self, path, number=0, of=1, gap=range(0)):
+        """Writes the log of one of some robots, a scan a second, without those of a gap. Returns the angles of its beams, and its true poses
+        and ranges by time in milliseconds."""
         scan = self.steps[0][1]
         angles = scan.angle_min + scan.angle_increment * np.arange(len(scan.ranges))
         found = {}
         with open(path, "wb") as target:
             log = RobotLog(target, 1.0, angles, scan.range_max)
             for log.number, (row, scan) in self.part(number, of):
+                if log.number in gap:
+                    continue
                 found[round(log.time() / 1e6)] = tuple(row[1:4]), np.array(scan.ranges)
                 log.write(row[1:4], row[4:7], np.array(scan.ranges))
             log.finish()

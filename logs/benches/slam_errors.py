@@ -4,7 +4,7 @@
 
 The folder has `NAME.mcap` (`/robot1/scan` and `/robot1/odom`; `/robot2/...` in the second halves) and `NAME.csv` (time in seconds, the corrected
 pose, the pose by odometry: x, y, yaw each) for the names below. Errors are distances after rigid alignment, metres. `--only` measures
-some of the parts: alone, together, whole, dealt, simulated, pairs, corridors. It needs `mcap-ros2-support` and numpy of PyPI.
+some of the parts: alone, together, whole, dealt, gaps, simulated, pairs, corridors. It needs `mcap-ros2-support` and numpy of PyPI.
 """
 
 import argparse
@@ -34,7 +34,12 @@ PAIRS = range(660, 668)
 LIDARS = ["--beams 360 --range 30", "--beams 360 --range 8", "--beams 36 --range 30"]
 CORRIDORS = [("bare, by scans alone", ""), ("with door frames, by scans alone", "--doors"), ("bare, with odometry", "--odometry")]
 ROBOTS = [2, 3, 4]
-PARTS = ["alone", "together", "whole", "dealt", "simulated", "pairs", "corridors"]
+PARTS = ["alone", "together", "whole", "dealt", "gaps", "simulated", "pairs", "corridors"]
+# Gaps in a drive: where they begin, as a share of its scans, and how many are missing.
+GAP_STARTS = [0.3, 0.5, 0.7]
+GAP_LENGTHS = [5, 10, 20, 40, 80]
+# The error of a map that is wrong, metres.
+WRONG = 0.5
 # Two robots have met where they are nearer to each other than this, metres.
 MEETING = 1.0
 # The exit status of a run in which a robot could not be merged.
@@ -176,6 +181,27 @@ def dealt_to(bench, drive, name, robots):
     return f"{shown(f'{name}, {robots} robots', distances(estimated, true))} {len(frames)} of {robots} merged |"
 
 
+def gaps(bench, public, name):
+    """A drive a stretch of which was not recorded: how often its map is whole, ends there, is refused, or is wrong, by the gap's length."""
+    drive = Drive(public, name)
+    return [gap_of(bench, drive, name, length) for length in GAP_LENGTHS]
+
+
+def gap_of(bench, drive, name, length):
+    outcomes = []
+    for share in GAP_STARTS:
+        start, log = int(share * len(drive.steps)), bench.file(f"{name}-gap-{share}-{length}.mcap")
+        truth = {time: pose for time, (pose, _) in drive.write(log, gap=range(start, start + length))[1].items()}
+        errors, whole = bench.errors(bench.merged(log), truth)
+        if errors is None:
+            outcomes.append("refused")
+        elif errors.max() > WRONG:
+            outcomes.append(f"wrong by {errors.max():.2f}")
+        else:
+            outcomes.append("whole" if whole > 0.995 else f"ends at {whole:.0%}")
+    return f"| {name} | {length} s | {', '.join(outcomes)} |"
+
+
 def simulated(bench, kind):
     name, seeds, lidar = kind
     found = []
@@ -226,11 +252,11 @@ def main():
     unknown = set(parts) - set(PARTS)
     if unknown:
         parser.error(f"there is no part {', '.join(sorted(unknown))}: the parts are {', '.join(PARTS)}")
-    if arguments.only != ",".join(PARTS) and not arguments.public and set(PARTS[:4]) & set(parts):
+    if arguments.only != ",".join(PARTS) and not arguments.public and set(PARTS[:5]) & set(parts):
         parser.error("public logs need --public FOLDER")
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(arguments.workers) as pool:
         bench = Bench(arguments.gridweave, Path(folder))
-        public = {"alone": (alone, ALONE), **{part.__name__: (part, HALVES) for part in (together, whole, dealt)}} if arguments.public else {}
+        public = {"alone": (alone, ALONE), **{part.__name__: (part, HALVES) for part in (together, whole, dealt, gaps)}} if arguments.public else {}
         for part, (measure, names) in public.items():
             if part in parts:
                 print_rows(pool.map(lambda name: measure(bench, arguments.public, name), names))

@@ -15,7 +15,8 @@
 //! At the end the robots whose maps are accepted as merged are refined [together](crate::mapping::slam::joint_poses), each
 //! in its own frame, so that what one robot saw straightens the map of another.
 //!
-//! A robot whose scans hardly ever lie on each other has lost its way: no map of it is sent.
+//! A robot whose scans hardly ever lie on each other has lost its way: no map of it is sent. Where nothing shows how a robot
+//! has moved, or after a gap of its scans nothing well enough, its map ends.
 //!
 //! - [`ScanBeams`]: the beams of a scan from the base of the robot, within the lidar's limits.
 //! - [`ScanMap`]: the growing map.
