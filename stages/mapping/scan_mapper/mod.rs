@@ -21,6 +21,7 @@
 //! - [`ScanBeams`]: the beams of a scan from the base of the robot, within the lidar's limits.
 //! - [`ScanMap`]: the growing map.
 
+mod along_odometry;
 mod beams;
 mod continuous_odometry;
 mod joint_refinement;

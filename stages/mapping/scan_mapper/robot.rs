@@ -1,5 +1,6 @@
 //! One robot with its scans and poses.
 
+use super::along_odometry::{Pauses, ScanTimes, add_along_odometry};
 use super::continuous_odometry::ContinuousOdometry;
 use super::scan_odometry::ScanOdometry;
 use super::slam_map::{BadScans, LossCause, LostWay, SlamMap, TagSighting};
@@ -14,12 +15,6 @@ use std::collections::VecDeque;
 
 /// Scans wait for a later pose for at most this long, seconds: poses are kept as long.
 const PATIENCE: f64 = 10.0;
-/// Standard deviations of the motion of a robot in a pause in which nothing shows it, metres and radians.
-const UNSEEN_MOTION: [f64; 2] = [0.5, 0.5];
-/// Least time without a scan, seconds and in usual intervals between scans, that is a gap.
-const LEAST_GAP: f64 = 1.0;
-const LEAST_INTERVALS: f64 = 3.0;
-
 /// Source of the robot's poses.
 enum Localization {
     /// No messages so far, or odometry only, and not for long.
@@ -294,7 +289,7 @@ impl Robot {
                 }
                 Localization::ByOdometry(slam) => {
                     let pauses = Pauses { blind: self.continuous.blind_pause(), of_scans: self.looked_up.gap(time) };
-                    add_to_slam(slam, &self.odometry, pauses, (time, &scan), parameters)
+                    add_along_odometry(slam, &self.odometry, pauses, (time, &scan), parameters)
                 }
             });
         }
@@ -349,81 +344,11 @@ fn draw_by_poses(
     }
 }
 
-/// Times of the scans of a robot so far.
-#[derive(Clone, Copy, Debug, Default)]
-struct ScanTimes {
-    first: Option<LogTime>,
-    last: Option<LogTime>,
-    intervals: f64,
-}
-
-impl ScanTimes {
-    /// Seconds without a scan before the next one, if they are a gap.
-    fn gap(&mut self, time: LogTime) -> Option<f64> {
-        let first = *self.first.get_or_insert(time);
-        let last = self.last.replace(time)?;
-        let (seconds, before) = (time.seconds_since(last), last.seconds_since(first));
-        let is_gap = seconds > LEAST_GAP && seconds * self.intervals > LEAST_INTERVALS * before;
-        self.intervals += 1.0;
-        is_gap.then_some(seconds)
-    }
-}
-
-/// Pauses before a scan.
-struct Pauses {
-    /// The last one in which nothing shows how the robot moved: its end, and its length in seconds.
-    blind: Option<(LogTime, f64)>,
-    /// Seconds without a scan.
-    of_scans: Option<f64>,
-}
-
-/// Adds a scan at its pose by odometry. If that is not known well enough, the robot has lost its way unless its scan shows it.
-fn add_to_slam(
-    slam: &mut SlamMap,
-    odometry: &PoseTrack,
-    pauses: Pauses,
-    (time, scan): (LogTime, &ScanBeams),
-    parameters: &ScanMapperParameters,
-) -> ScanOutcome {
-    if slam.lost_way().is_some() {
-        return ScanOutcome::Used;
-    }
-    let Some(start) = pose_at(odometry, time, parameters) else { return ScanOutcome::NoPose };
-    // The relative poses of the beams of one scan are those of odometry.
-    let still =
-        || scan.without_motion(|delay| Some(start.inv_mul(&pose_at(odometry, time.plus_seconds(delay), parameters)?)));
-    let mut guess = start;
-    if let Some((deviations, lost)) = unseen_motion(slam, &pauses, time, &start) {
-        let located = slam.relocate(&start, deviations, &still());
-        match located.filter(|located| located.is_sure && located.deviation <= parameters.step) {
-            Some(located) => guess = located.pose,
-            None => slam.lose_way(lost),
-        }
-    }
-    if !slam.is_due(time, &start, parameters) {
-        return ScanOutcome::Used;
-    }
-    if slam.add(time, &start, &guess, &still()) { ScanOutcome::Used } else { ScanOutcome::NotMatched }
-}
-
-/// The standard deviations of the motion up to a scan, metres and radians, if it is as uncertain as one that nothing shows; and where
-/// the robot has then lost its way.
-fn unseen_motion(slam: &SlamMap, pauses: &Pauses, time: LogTime, odometry: &Pose2) -> Option<([f64; 2], LostWay)> {
-    let is_since_last = |end: LogTime| end <= time && slam.last_time().is_some_and(|last| last < end);
-    if let Some((end, seconds)) = pauses.blind.filter(|(end, _)| is_since_last(*end)) {
-        return Some((UNSEEN_MOTION, LostWay { time: end, cause: LossCause::Pause(seconds) }));
-    }
-    let seconds = pauses.of_scans?;
-    let deviations = slam.deviations_after_gap(seconds, odometry);
-    let lost = LostWay { time, cause: LossCause::ScanGap { seconds, deviation: deviations[0] } };
-    (deviations[0] > UNSEEN_MOTION[0]).then_some((deviations, lost))
-}
-
 fn position(pose: &Pose2) -> Position {
     Position { yaw: pose.rotation.angle(), ..Position::new(Point2::from(pose.translation.vector)) }
 }
 
-fn pose_at(track: &PoseTrack, time: LogTime, parameters: &ScanMapperParameters) -> Option<Pose2> {
+pub(super) fn pose_at(track: &PoseTrack, time: LogTime, parameters: &ScanMapperParameters) -> Option<Pose2> {
     let Position { place, yaw, .. } = track.position(time, parameters.max_pose_age).ok()?;
     Some(pose(place.x, place.y, yaw))
 }

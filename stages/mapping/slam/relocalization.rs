@@ -107,8 +107,7 @@ fn find_only_place(field: &LikelihoodField, points: &[Point2], prior: &PosePrior
 /// the standard deviations of its position and yaw, metres and radians. `None` if it fits nowhere, or at several places.
 pub(super) fn relocate(map: &LocalMap, points: &[ScanPoint], guess: &Pose2, deviations: [f64; 2]) -> Option<Match> {
     let [place, yaw] = deviations.map(|deviation| WINDOW * deviation);
-    // Written so that a value that is not a number fails it.
-    if !(place <= LARGEST_WINDOW[0]) {
+    if !place.is_finite() || place > LARGEST_WINDOW[0] {
         return None;
     }
     let information = Vector3::new(deviations[0], deviations[0], deviations[1]).map(|deviation| deviation.powi(-2));

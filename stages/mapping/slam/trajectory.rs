@@ -5,7 +5,7 @@ use super::local_map::LocalMap;
 use super::loop_closure::{Drive, Revisit, middle};
 use super::odometry_noise::OdometryNoise;
 use super::pose_graph::{Constraint, LandmarkSighting, PoseGraph, turned_information, yaw_information};
-use super::relocalization::{find_loop_closures, relocate};
+use super::relocalization::find_loop_closures;
 use super::revisits::refine;
 use super::scan_points::ScanPoint;
 use super::scan_registration::{RegisteredScan, SLIP_GAIN, WELL_MATCHED, register};
@@ -31,25 +31,13 @@ const YAW_SHARE: f64 = 0.2;
 /// taken, as a window that is too narrow loses closures, and one that is too wide costs time.
 pub const YAW_OF_MAP_SHARE: f64 = 0.03;
 /// Share of its points that must lie on the local map, for a scan to be registered at all.
-const LEAST_MATCHED: f64 = 0.15;
+pub(super) const LEAST_MATCHED: f64 = 0.15;
 /// Distance of an earlier submap from the robot, metres, up to which it is part of the local map once a loop closure
 /// has tied it; the number of these, the nearest ones; and the standard deviations up to which it is tied, metres and
 /// radians.
 const REVISITED_DISTANCE: f64 = 10.0;
 const REVISITED_SUBMAPS: usize = 6;
 const REVISITED_DEVIATIONS: [f64; 2] = [0.15, 0.05];
-
-/// A scan that was registered without being added.
-#[derive(Clone, Copy, Debug)]
-pub struct LocatedScan {
-    /// Pose of the base in its frame at the last scan.
-    pub pose: Pose2,
-    /// Whether most of its points lie on the map.
-    pub is_sure: bool,
-    /// Standard deviation of its position by its walls alone in the direction in which they show it least, metres.
-    /// It is large between two parallel walls.
-    pub deviation: f64,
-}
 
 /// The scans of a robot with their poses, in the frame of the first.
 #[derive(Clone, Debug)]
@@ -281,26 +269,6 @@ impl Trajectory {
         self.graph.sightings.push(LandmarkSighting { from: scan, landmark, place, deviation });
     }
 
-    /// Registers points on the local map, without adding them: the pose relative to the last scan, `guess` being what
-    /// it is expected to be with these standard deviations of position and yaw. `None` if the points lie on no earlier
-    /// ones.
-    pub fn locate(&self, guess: &Pose2, deviations: [f64; 2], points: &[ScanPoint]) -> Option<LocatedScan> {
-        let last = self.graph.poses.last()?;
-        let [place, yaw] = deviations.map(|deviation| deviation.powi(-2));
-        let information = Matrix3::from_diagonal(&Vector3::new(place, place, yaw));
-        let information = turned_information(&information, &last.rotation);
-        let found = register(self.local_map(), points, &(last * guess), &information, deviations);
-        (found.matched >= LEAST_MATCHED).then(|| located(last, &found.pose, found.matched, &found.information))
-    }
-
-    /// Registers points likewise where they lie at one place alone, of all at which they may be. `None` if they lie nowhere, or at
-    /// several.
-    pub fn relocate(&self, guess: &Pose2, deviations: [f64; 2], points: &[ScanPoint]) -> Option<LocatedScan> {
-        let last = self.graph.poses.last()?;
-        let found = relocate(self.local_map(), points, &(last * guess), deviations)?;
-        Some(located(last, &found.pose, found.matched, &found.information))
-    }
-
     fn push(&mut self, pose: Pose2, way: f64, points: Vec<ScanPoint>) {
         self.local_map.take();
         self.graph.poses.push(pose);
@@ -325,7 +293,7 @@ impl Trajectory {
     }
 
     /// The last scans, and the earlier submaps around the robot.
-    fn local_map(&self) -> &LocalMap {
+    pub(super) fn local_map(&self) -> &LocalMap {
         self.local_map.get_or_init(|| {
             let recent = self.recent();
             let revisited = self.revisited.iter().flat_map(|submap| self.submaps[*submap].clone());
@@ -426,15 +394,5 @@ impl Trajectory {
         let mut nearest: Vec<(f64, usize)> = tied.map(|submap| (distance(&submap), submap)).collect();
         nearest.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         nearest.into_iter().take(REVISITED_SUBMAPS).map(|(_, submap)| submap).collect()
-    }
-}
-
-/// A scan at a pose, of whose points a share lies on the map, with the information on its pose by its walls alone.
-fn located(last: &Pose2, pose: &Pose2, matched: f64, information: &Matrix3<f64>) -> LocatedScan {
-    let of_position = information.fixed_view::<2, 2>(0, 0).into_owned();
-    LocatedScan {
-        pose: last.inv_mul(pose),
-        is_sure: matched >= WELL_MATCHED,
-        deviation: of_position.symmetric_eigenvalues().min().max(0.0).sqrt().recip(),
     }
 }
