@@ -13,7 +13,7 @@ const UNSEEN_MOTION: [f64; 2] = [0.5, 0.5];
 const LEAST_GAP: f64 = 1.0;
 const LEAST_INTERVALS: f64 = 3.0;
 
-/// Times of the scans of a robot so far.
+/// Times of the scans of a robot whose poses by odometry are known.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ScanTimes {
     first: Option<LogTime>,
@@ -33,19 +33,13 @@ impl ScanTimes {
     }
 }
 
-/// Pauses before a scan.
-pub(super) struct Pauses {
-    /// The last one in which nothing shows how the robot moved: its end, and its length in seconds.
-    pub(super) blind: Option<(LogTime, f64)>,
-    /// Seconds without a scan.
-    pub(super) of_scans: Option<f64>,
-}
-
 /// Adds a scan at its pose by odometry. If that is not known well enough, the robot has lost its way unless its scan shows it.
+/// `blind` is the last pause in which nothing shows how the robot moved: its end, and its length in seconds.
 pub(super) fn add_along_odometry(
     slam: &mut SlamMap,
     odometry: &PoseTrack,
-    pauses: Pauses,
+    placed: &mut ScanTimes,
+    blind: Option<(LogTime, f64)>,
     (time, scan): (LogTime, &ScanBeams),
     parameters: &ScanMapperParameters,
 ) -> ScanOutcome {
@@ -57,14 +51,15 @@ pub(super) fn add_along_odometry(
     let still =
         || scan.without_motion(|delay| Some(start.inv_mul(&pose_at(odometry, time.plus_seconds(delay), parameters)?)));
     let mut guess = start;
-    if let Some((deviations, lost)) = unseen_motion(slam, &pauses, time, &start) {
+    let gap = placed.gap(time);
+    if let Some((deviations, lost)) = unseen_motion(slam, blind, gap, time, &start) {
         let located = slam.relocate(&start, deviations, &still());
         match located.filter(|located| located.is_sure && located.deviation <= parameters.step) {
             Some(located) => guess = located.pose,
             None => slam.lose_way(lost),
         }
     }
-    if !slam.is_due(time, &start, parameters) {
+    if !slam.is_due(time, &guess, parameters) {
         return ScanOutcome::Used;
     }
     if slam.add(time, &start, &guess, &still()) { ScanOutcome::Used } else { ScanOutcome::NotMatched }
@@ -72,12 +67,18 @@ pub(super) fn add_along_odometry(
 
 /// The standard deviations of a motion up to a scan that is as uncertain as one that nothing shows, metres and radians; and where the
 /// robot has lost its way if the scan does not show it either.
-fn unseen_motion(slam: &SlamMap, pauses: &Pauses, time: LogTime, odometry: &Pose2) -> Option<([f64; 2], LostWay)> {
+fn unseen_motion(
+    slam: &SlamMap,
+    blind: Option<(LogTime, f64)>,
+    gap: Option<f64>,
+    time: LogTime,
+    odometry: &Pose2,
+) -> Option<([f64; 2], LostWay)> {
     let is_since_last = |end: LogTime| end <= time && slam.last_time().is_some_and(|last| last < end);
-    if let Some((end, seconds)) = pauses.blind.filter(|(end, _)| is_since_last(*end)) {
+    if let Some((end, seconds)) = blind.filter(|(end, _)| is_since_last(*end)) {
         return Some((UNSEEN_MOTION, LostWay { time: end, cause: LossCause::Pause(seconds) }));
     }
-    let seconds = pauses.of_scans?;
+    let seconds = gap?;
     let deviations = slam.deviations_after_gap(seconds, odometry);
     let lost = LostWay { time, cause: LossCause::ScanGap { seconds, deviation: deviations[0] } };
     (deviations[0] > UNSEEN_MOTION[0]).then_some((deviations, lost))

@@ -39,8 +39,8 @@ pub(super) fn lost_way(name: &str, seconds: f64, cause: LossCause) -> String {
         ),
         LossCause::ScanGap { seconds, deviation } => (
             format!(
-                "it has no scans of the {seconds:.1} s before, by odometry it may be {deviation:.1} m off (standard deviation), and \
-                 its scans lie on no earlier ones"
+                "it has no scans with odometry of the {seconds:.1} s before, in which odometry may be {deviation:.1} m off (standard \
+                 deviation), and its scan does not show where it is"
             ),
             CUT_THERE.to_owned(),
         ),

@@ -1,6 +1,6 @@
 //! One robot with its scans and poses.
 
-use super::along_odometry::{Pauses, ScanTimes, add_along_odometry};
+use super::along_odometry::{ScanTimes, add_along_odometry};
 use super::continuous_odometry::ContinuousOdometry;
 use super::scan_odometry::ScanOdometry;
 use super::slam_map::{BadScans, LossCause, LostWay, SlamMap, TagSighting};
@@ -15,6 +15,7 @@ use std::collections::VecDeque;
 
 /// Scans wait for a later pose for at most this long, seconds: poses are kept as long.
 const PATIENCE: f64 = 10.0;
+
 /// Source of the robot's poses.
 enum Localization {
     /// No messages so far, or odometry only, and not for long.
@@ -53,8 +54,8 @@ pub(super) struct Robot {
     /// The frame of the poses.
     pub(super) frame: Option<String>,
     waiting: VecDeque<(LogTime, ScanBeams)>,
-    /// Those whose poses by odometry were looked up.
-    looked_up: ScanTimes,
+    /// Times of the scans whose poses by odometry are known.
+    placed: ScanTimes,
     /// Tags that were seen, for which no pose is known so far.
     waiting_tags: VecDeque<(LogTime, TagSighting)>,
     first_scan: Option<LogTime>,
@@ -79,7 +80,7 @@ impl Robot {
             kept_odometry: Vec::new(),
             frame: None,
             waiting: VecDeque::new(),
-            looked_up: ScanTimes::default(),
+            placed: ScanTimes::default(),
             waiting_tags: VecDeque::new(),
             first_scan: None,
             scans: 0,
@@ -288,8 +289,8 @@ impl Robot {
                     drawn
                 }
                 Localization::ByOdometry(slam) => {
-                    let pauses = Pauses { blind: self.continuous.blind_pause(), of_scans: self.looked_up.gap(time) };
-                    add_along_odometry(slam, &self.odometry, pauses, (time, &scan), parameters)
+                    let blind = self.continuous.blind_pause();
+                    add_along_odometry(slam, &self.odometry, &mut self.placed, blind, (time, &scan), parameters)
                 }
             });
         }
@@ -348,6 +349,7 @@ fn position(pose: &Pose2) -> Position {
     Position { yaw: pose.rotation.angle(), ..Position::new(Point2::from(pose.translation.vector)) }
 }
 
+/// The pose on a track at a time; `None` if none is known near it.
 pub(super) fn pose_at(track: &PoseTrack, time: LogTime, parameters: &ScanMapperParameters) -> Option<Pose2> {
     let Position { place, yaw, .. } = track.position(time, parameters.max_pose_age).ok()?;
     Some(pose(place.x, place.y, yaw))

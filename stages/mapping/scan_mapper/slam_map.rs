@@ -56,7 +56,7 @@ pub(super) struct LostWay {
 pub(super) enum LossCause {
     /// Nothing shows how it moved in a pause of so many seconds before, and its scans lie on no earlier ones.
     Pause(f64),
-    /// Nothing but odometry does, which is uncertain by so many metres.
+    /// Nothing but odometry shows how it moved in so many seconds without scans; its standard deviation is in metres.
     ScanGap { seconds: f64, deviation: f64 },
     /// It has no odometry, and its scans show walls of one direction only, as in a bare corridor.
     ParallelWalls,

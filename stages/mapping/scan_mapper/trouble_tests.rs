@@ -144,14 +144,23 @@ fn a_robot_that_is_elsewhere_after_a_pause_has_lost_its_way() {
     assert!(warns(&mut bench, lost), "{:?}", bench.0.warnings());
 }
 
-/// Drives for half a minute with a gap of ten seconds without scans and odometry, which is then off by `off`, and scans that are
-/// changed.
-fn drive_with_gap(off: &Pose2, changed: impl Fn(RangeScan) -> RangeScan) -> Bench {
+/// Drives for half a minute with a gap of ten seconds without odometry, which is then off by `off`, and with no scans in it or all of
+/// them, which are changed from its end on.
+fn drive_with_gap(off: &Pose2, has_scans: bool, changed: impl Fn(RangeScan) -> RangeScan) -> Bench {
     let mut bench = Bench::new("mode = 'offline'");
-    for seconds in (0..400).map(|tick| 0.1 * f64::from(tick)).filter(|seconds| !(10.0..20.0).contains(seconds)) {
-        let is_after = seconds > 15.0;
-        bench.pose("odometry", "robot1/odom", seconds, if is_after { off * truth(seconds) } else { truth(seconds) });
-        bench.scan(seconds, &if is_after { changed(still(seconds)) } else { still(seconds) });
+    for seconds in (0..400).map(|tick| 0.1 * f64::from(tick)) {
+        let (is_gap, is_after) = ((10.0..20.0).contains(&seconds), seconds >= 20.0);
+        if !is_gap {
+            bench.pose(
+                "odometry",
+                "robot1/odom",
+                seconds,
+                if is_after { off * truth(seconds) } else { truth(seconds) },
+            );
+        }
+        if !is_gap || has_scans {
+            bench.scan(seconds, &if is_after { changed(still(seconds)) } else { still(seconds) });
+        }
     }
     bench
 }
@@ -159,23 +168,25 @@ fn drive_with_gap(off: &Pose2, changed: impl Fn(RangeScan) -> RangeScan) -> Benc
 #[test]
 fn a_robot_whose_odometry_is_too_uncertain_after_a_gap_of_its_scans_has_lost_its_way() {
     let shaft = |scan: RangeScan| RangeScan { ranges: vec![0.7; scan.ranges.len()], ..scan };
-    let mut bench = drive_with_gap(&Pose2::identity(), shaft);
-    let drawn = measure(&bench.map(40.0).0.unwrap(), &Pose2::identity());
-    assert!(
-        drawn.mean < CELL && drawn.greatest < 4.0 * CELL,
-        "what was before stays: {} {}",
-        drawn.mean,
-        drawn.greatest
-    );
-    let poses: Vec<PoseWithCovarianceStamped> = bench.0.take("pose").unwrap();
-    assert!(!poses.is_empty() && poses.iter().all(|pose| LogTime::from(pose.header.stamp) < at(10.0)));
-    let lost = "robot1 has lost its way 20.0 s after its first scan: it has no scans of the 10.1 s before";
-    assert!(warns(&mut bench, lost), "{:?}", bench.0.warnings());
+    for has_scans in [false, true] {
+        let mut bench = drive_with_gap(&Pose2::identity(), has_scans, shaft);
+        let drawn = measure(&bench.map(40.0).0.unwrap(), &Pose2::identity());
+        assert!(
+            drawn.mean < CELL && drawn.greatest < 4.0 * CELL,
+            "what was before stays: {} {}",
+            drawn.mean,
+            drawn.greatest
+        );
+        let poses: Vec<PoseWithCovarianceStamped> = bench.0.take("pose").unwrap();
+        assert!(!poses.is_empty() && poses.iter().all(|pose| LogTime::from(pose.header.stamp) < at(11.0)));
+        let lost = "robot1 has lost its way 20.0 s after its first scan: it has no scans with odometry of the ";
+        assert!(warns(&mut bench, lost), "{:?}", bench.0.warnings());
+    }
 }
 
 #[test]
 fn a_robot_that_sees_where_it_is_after_a_gap_of_its_scans_goes_on_there() {
-    let mut bench = drive_with_gap(&pose(0.9, -0.7, 0.5), |scan| scan);
+    let mut bench = drive_with_gap(&pose(0.9, -0.7, 0.5), false, |scan| scan);
     let drawn = measure(&bench.map(40.0).0.unwrap(), &Pose2::identity());
     assert!(drawn.mean < CELL && drawn.greatest < 8.0 * CELL, "{} {}", drawn.mean, drawn.greatest);
     let poses: Vec<PoseWithCovarianceStamped> = bench.0.take("pose").unwrap();
