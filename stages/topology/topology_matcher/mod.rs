@@ -15,6 +15,7 @@
 //! buildings repeat themselves. The criteria of [`judge`] are not from the paper. They use paths only, not walls, and
 //! can be wrong: where it matters, the ranked poses go through `icp_refiner` and `merge_verifier`.
 
+mod candidates;
 mod exhaustive;
 mod icp_svd;
 mod judge;
@@ -27,7 +28,7 @@ mod topology;
 #[cfg(test)]
 mod tests;
 
-pub use exhaustive::{Exhaustive, exhaustive};
+pub use exhaustive::{Exhaustive, TooDense, exhaustive};
 pub use icp_svd::{IcpSvd, icp_svd, icp_svd_from};
 pub use judge::{PoseJudgement, judge};
 pub use matched_pose::{MatchedPose, distinct};

@@ -66,7 +66,8 @@ pub struct TopologyMatcherParameters {
     /// pose, 0 to 1; `min_paths` and `min_share` must hold as well.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub max_runner_up: f64,
-    /// Largest number of nodes of a map that is matched: time grows with more than the square of their number.
+    /// Largest number of nodes of a map that is matched: time grows with more than the square of their number. Three
+    /// paths for each of them are matched at most.
     #[schemars(range(min = 1, max = 2000))]
     pub max_nodes: usize,
 }
@@ -90,6 +91,16 @@ impl Default for TopologyMatcherParameters {
             max_runner_up: 0.6,
             max_nodes: 400,
         }
+    }
+}
+
+/// Paths that are matched for each node, at most: a map on a floor has less than three, as its paths hardly cross.
+pub(super) const PATHS_FOR_EACH_NODE: usize = 3;
+
+impl TopologyMatcherParameters {
+    /// Largest number of paths of a map that is matched.
+    pub(super) fn max_paths(&self) -> usize {
+        PATHS_FOR_EACH_NODE * self.max_nodes
     }
 }
 

@@ -3,16 +3,13 @@
 use super::icp_svd::IcpSvd;
 use super::judge::{PoseJudgement, judge};
 use super::matched_pose::MatchedPose;
-use super::parameters::{MatchingMethod, TopologyMatcherParameters};
+use super::parameters::{MatchingMethod, PATHS_FOR_EACH_NODE, TopologyMatcherParameters};
 use super::{Topology, exhaustive, icp_svd};
 use crate::shared::geometry::row_by_row;
 use crate::shared::robot_pair::RobotPair;
 use gridweave_runtime::ros::{Alignment, Header, TopologicalMap};
 use gridweave_runtime::stage::{Out, Output, OutputPorts, Outputs, Received, StageError};
 use std::collections::BTreeMap;
-
-/// Paths that are matched for each node, at most: a map on a floor has less than three, as its paths hardly cross.
-const PATHS_FOR_EACH_NODE: usize = 3;
 
 /// Outputs of the stage.
 pub(super) struct Matches {
@@ -86,25 +83,10 @@ impl TopologyMatcher {
             method: method.into(),
             ..Alignment::default()
         };
-        let most = self.parameters.max_nodes;
-        if a.nodes.len().max(b.nodes.len()) > most {
-            let reason = format!(
-                "the topological maps have {} and {} nodes, and at most {most} are matched (max_nodes)",
-                a.nodes.len(),
-                b.nodes.len()
-            );
-            return output.alignment.send("", &Alignment { reason, ..of_pair });
-        }
-        let most = PATHS_FOR_EACH_NODE * most;
-        if a.paths.len().max(b.paths.len()) > most {
-            let reason = format!(
-                "the topological maps have {} and {} paths, and at most {most} are matched ({PATHS_FOR_EACH_NODE} for each of max_nodes)",
-                a.paths.len(),
-                b.paths.len()
-            );
-            return output.alignment.send("", &Alignment { reason, ..of_pair });
-        }
-        let (poses, work) = self.poses(a, b, output);
+        let (poses, work) = match self.poses(a, b, output) {
+            Ok(found) => found,
+            Err(reason) => return output.alignment.send("", &Alignment { reason, ..of_pair }),
+        };
         let PoseJudgement { accepted, score, reason } = judge(a, b, &poses, &self.parameters);
         let verdict = Alignment { score, accepted, reason: format!("{reason}\n\n{work}"), ..of_pair.clone() };
         output.alignment.send("", &placed(verdict, poses.first()))?;
@@ -126,19 +108,39 @@ impl TopologyMatcher {
         Ok(())
     }
 
-    /// The best poses of a pair, and a description of the search.
-    fn poses(&self, a: &Topology, b: &Topology, output: &Output<Matches>) -> (Vec<MatchedPose>, String) {
-        match self.parameters.method {
+    /// The best poses of a pair, and a description of the search; or why the maps are too large to be matched.
+    fn poses(
+        &self,
+        a: &Topology,
+        b: &Topology,
+        output: &Output<Matches>,
+    ) -> Result<(Vec<MatchedPose>, String), String> {
+        let parameters = &self.parameters;
+        let (nodes, most) = ([a.nodes.len(), b.nodes.len()], parameters.max_nodes);
+        if nodes.iter().any(|count| *count > most) {
+            let [a, b] = nodes;
+            return Err(format!(
+                "the topological maps have {a} and {b} nodes, and at most {most} are matched (max_nodes)"
+            ));
+        }
+        let (paths, most) = ([a.paths.len(), b.paths.len()], parameters.max_paths());
+        if paths.iter().any(|count| *count > most) {
+            let [a, b] = paths;
+            return Err(format!(
+                "the topological maps have {a} and {b} paths, and at most {most} are matched ({PATHS_FOR_EACH_NODE} for each of max_nodes)"
+            ));
+        }
+        match parameters.method {
             MatchingMethod::Exhaustive => {
-                let found = exhaustive(a, b, &self.parameters);
+                let found = exhaustive(a, b, parameters).map_err(|too_dense| too_dense.to_string())?;
                 output.count("trials", found.trials);
                 let work = format!("{} trials: {} nodes on {} nodes", found.trials, b.nodes.len(), a.nodes.len());
-                (found.poses, work)
+                Ok((found.poses, work))
             }
             MatchingMethod::IcpSvd => {
-                let (runs, poses) = icp_svd(a, b, &self.parameters);
+                let (runs, poses) = icp_svd(a, b, parameters);
                 output.count("iterations", runs.iter().map(|run| run.errors.len() as u64).sum());
-                (poses, runs.iter().enumerate().map(run_text).collect::<Vec<_>>().join("\n"))
+                Ok((poses, runs.iter().enumerate().map(run_text).collect::<Vec<_>>().join("\n")))
             }
         }
     }

@@ -30,10 +30,10 @@ fn degrees(matched_pose: &MatchedPose) -> f64 {
 fn a_pose_is_not_refined_without_refine() {
     let truth = pose(2.0, -1.0, 136.7f64.to_radians());
     let parameters = TopologyMatcherParameters { refine: false, ..Default::default() };
-    let found = exhaustive(&seven(), &four(&truth), &parameters);
+    let found = exhaustive(&seven(), &four(&truth), &parameters).unwrap();
     let turn = degrees(&found.poses[0]);
     assert!((turn / 2.0 - (turn / 2.0).round()).abs() < 1e-9, "{turn}");
-    let exact = exhaustive(&seven(), &four(&truth), &TopologyMatcherParameters::default());
+    let exact = exhaustive(&seven(), &four(&truth), &TopologyMatcherParameters::default()).unwrap();
     assert!(exact.poses[..2].iter().any(|matched_pose| (degrees(matched_pose) - 136.7).abs() < 1e-6));
 }
 
@@ -79,23 +79,28 @@ fn random_map() -> impl Strategy<Value = Topology> {
     })
 }
 
+/// Every node of b on every node of a, at every turn, counted by equation 2.
+fn all_trials(a: &Topology, b: &Topology, parameters: &TopologyMatcherParameters) -> Vec<MatchedPose> {
+    let turns = (0..181).map(|turn| nalgebra::UnitComplex::new(turn as f64 * parameters.turn_step));
+    let poses = turns.flat_map(|rotation| {
+        let pairs = a.nodes.iter().flat_map(|node_a| b.nodes.iter().map(move |node_b| (node_a, node_b)));
+        pairs
+            .map(move |(node_a, node_b)| Pose2::from_parts((node_a.coords - rotation * node_b.coords).into(), rotation))
+    });
+    let found = poses.filter_map(|transform_a_b| MatchedPose::at(a, b, transform_a_b, parameters));
+    found.collect()
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(8))]
     #[test]
-    fn a_trial_counts_the_paths_that_equation_2_counts(a in random_map(), b in random_map()) {
+    fn the_best_poses_are_those_of_all_trials(a in random_map(), b in random_map()) {
         let parameters = TopologyMatcherParameters { refine: false, tolerance: 1.5, ..Default::default() };
-        let found = exhaustive(&a, &b, &parameters);
-        let by_trials = |turn: usize| {
-            let rotation = nalgebra::UnitComplex::new(turn as f64 * parameters.turn_step);
-            let (a, b, parameters) = (&a, &b, &parameters);
-            let poses = a.nodes.iter().flat_map(move |node_a| b.nodes.iter().map(move |node_b| {
-                let translation = node_a.coords - rotation * node_b.coords;
-                coinciding(a, b, &Pose2::from_parts(translation.into(), rotation), parameters.tolerance).len()
-            }));
-            poses.max().unwrap_or(0)
-        };
-        let most = (0..181).map(by_trials).max().unwrap_or(0);
-        prop_assert_eq!(found.poses.first().map_or(0, |matched_pose| matched_pose.similarity), most);
+        let found = exhaustive(&a, &b, &parameters).unwrap();
+        let similarities: Vec<usize> = found.poses.iter().map(|matched_pose| matched_pose.similarity).collect();
+        let trials = all_trials(&a, &b, &parameters);
+        let expected = distinct(trials, parameters.max_hypotheses, &b, &parameters);
+        prop_assert_eq!(similarities, expected.iter().map(|trial| trial.similarity).collect::<Vec<_>>());
     }
 
     #[test]
@@ -103,7 +108,7 @@ proptest! {
         let truth = pose(x, y, yaw);
         let b = Topology { nodes: a.nodes.iter().map(|node| truth.inverse() * node).collect(), ..a.clone() };
         let parameters = TopologyMatcherParameters::default();
-        let (forth, back) = (exhaustive(&a, &b, &parameters), exhaustive(&b, &a, &parameters));
+        let [forth, back] = [(&a, &b), (&b, &a)].map(|(one, other)| exhaustive(one, other, &parameters).unwrap());
         let identity = forth.poses[0].transform_a_b * back.poses[0].transform_a_b;
         prop_assert!(identity.translation.vector.norm() < 1e-6 && identity.rotation.angle().abs() < 1e-6);
         prop_assert!((forth.poses[0].transform_a_b.inverse() * truth).translation.vector.norm() < 1e-6);
@@ -171,6 +176,19 @@ fn a_refusal_names_what_is_missing() {
     let large = message("robot2", &Topology { nodes: vec![Point2::origin(); 401], paths: Vec::new() });
     let (alignments, _, _) = sent("", &[("robot1", message("robot1", &seven())), ("robot2", large)]);
     assert!(alignments[0].reason.contains("max_nodes"));
+}
+
+#[test]
+fn maps_whose_paths_lie_within_the_tolerance_of_each_other_are_refused() {
+    // Ten nodes at either end of a corridor, and paths from each to some of the other end.
+    let nodes = (0..20).map(|node| Point2::new(9.0 * f64::from(node / 10), 0.01 * f64::from(node % 10)));
+    let paths = (0..60).map(|path| [path % 10, 10 + (path / 10 + path) % 10]);
+    let dense = Topology { nodes: nodes.collect(), paths: paths.collect() };
+    let maps = ["robot1", "robot2"].map(|robot| (robot, message(robot, &dense)));
+    let (alignments, hypotheses, _) = sent("max_nodes = 20", &maps);
+    assert!(alignments[0].reason.contains("a smaller tolerance") && hypotheses.is_empty(), "{}", alignments[0].reason);
+    let (alignments, ..) = sent("max_nodes = 20\ntolerance = 0.001", &maps);
+    assert!(!alignments[0].reason.contains("tolerance"), "{}", alignments[0].reason);
 }
 
 #[test]
