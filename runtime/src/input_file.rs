@@ -42,13 +42,13 @@ pub fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     }
 }
 
-/// Reads a whole text of at most [`LONGEST_TEXT`] bytes: UTF-8, or UTF-16 with a byte order mark, as some editors write
+/// Reads a whole text of at most `most` bytes, seldom others than [`LONGEST_TEXT`]: UTF-8, or UTF-16 with a byte order mark, as some editors write
 /// it.
 ///
 /// # Errors
 /// As [`read`]; or it is not such text.
-pub fn read_text(path: &Path) -> io::Result<String> {
-    let bytes = read(path, LONGEST_TEXT)?;
+pub fn read_text(path: &Path, most: u64) -> io::Result<String> {
+    let bytes = read(path, most)?;
     let wrong = |text: String| io::Error::new(ErrorKind::InvalidData, text);
     let utf_16 = match bytes.as_slice() {
         [0xff, 0xfe, text @ ..] => Some(of_utf_16(text, u16::from_le_bytes)),
@@ -87,7 +87,7 @@ mod tests {
         std::fs::write(&file, b"0123456789\xff").unwrap();
         assert_eq!(read(&file, 11).unwrap().len(), 11);
         assert!(read(&file, 10).unwrap_err().to_string().contains("longer than 10 bytes"));
-        assert!(read_text(&file).unwrap_err().to_string().contains("byte 10 is not UTF-8"));
+        assert!(read_text(&file, LONGEST_TEXT).unwrap_err().to_string().contains("byte 10 is not UTF-8"));
     }
 
     #[test]
@@ -96,7 +96,7 @@ mod tests {
         let file = folder.path().join("file");
         let read = |bytes: &[u8]| {
             std::fs::write(&file, bytes).unwrap();
-            read_text(&file).map_err(|error| error.to_string())
+            read_text(&file, LONGEST_TEXT).map_err(|error| error.to_string())
         };
         let bytes = |to_bytes: fn(u16) -> [u8; 2]| -> Vec<u8> {
             "\u{feff}Gr\u{f6}\u{df}e \u{1f5fa}".encode_utf16().flat_map(to_bytes).collect()

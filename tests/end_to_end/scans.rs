@@ -199,3 +199,34 @@ fn a_robot_that_loses_its_way_is_not_merged_and_the_reason_is_reported() {
     merge(&["robot1.mcap", "robot2.mcap"]).assert(3, &["not merged: robot2", "scans lie on none of its others"]);
     merge(&["robot2.mcap"]).assert(1, &["no usable map", "no map of robot2", "scans lie on none of its others"]);
 }
+
+/// Writes a log again in which what robot1 logs under a topic is cut in half.
+fn with_cut_messages(log: &Path, to: &Path, topic: &str) {
+    let bytes = std::fs::read(log).unwrap();
+    let mut written = LogBuilder::new(to);
+    for message in mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap) {
+        let half = if message.channel.topic == topic { 2 } else { 1 };
+        let type_name = &message.channel.schema.as_ref().unwrap().name;
+        let data = &message.data[..message.data.len() / half];
+        written.raw(message.log_time as f64 * 1e-9, &message.channel.topic, type_name, data);
+    }
+    written.finish();
+}
+
+#[test]
+fn a_robot_of_which_nothing_can_be_read_is_named_as_not_merged() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    for (topics, cut, text) in [
+        ("/{robot}/scan,/{robot}/pose", "/robot1/scan", "none of its scans could be used"),
+        ("/{robot}/map", "/robot1/map", "none of its maps could be used"),
+    ] {
+        logs_with(folder, topics);
+        with_cut_messages(&folder.join("scans.mcap"), &folder.join("cut.mcap"), cut);
+        let options = ["merge", "cut.mcap", "-o", "out.mcap", "--summary", "summary.json"];
+        gridweave(folder, &options).assert(3, &["not merged: robot1", text]);
+        let summary: Value = serde_json::from_slice(&std::fs::read(folder.join("summary.json")).unwrap()).unwrap();
+        assert!(summary["unmerged"]["robot1"].as_str().is_some_and(|reason| reason.contains(text)), "{summary}");
+        gridweave(folder, &[&options[..], &["--robots", "robot2"]].concat()).assert(0, &[]);
+    }
+}

@@ -30,3 +30,13 @@ pub fn robots_with_scans_only(
     let channels = RobotChannels::new(robots.clone(), names.channels());
     Ok(channels.scanned().map(str::to_owned).collect())
 }
+
+/// The robots with maps, by name. Only the channels are read.
+///
+/// # Errors
+/// A log cannot be read, or the rules do not match the logs.
+pub fn robots_with_maps(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result<Vec<String>, NameError> {
+    let (_, names) = names::open(inputs, rules, robots)?;
+    let channels = RobotChannels::new(robots.clone(), names.channels());
+    Ok(channels.mapped().map(str::to_owned).collect())
+}

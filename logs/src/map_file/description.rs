@@ -22,6 +22,8 @@ pub(super) struct Description {
     pub(super) assumed: Vec<String>,
 }
 
+/// The farthest origin along an axis, metres: ten times farther than any coordinates of the earth's grids.
+const FARTHEST_ORIGIN: f64 = 1e8;
 /// The thresholds of a file without any: those of ROS map servers and savers.
 const USUAL_THRESHOLDS: [(&str, f64); 2] = [("occupied_thresh", 0.65), ("free_thresh", 0.196)];
 /// A threshold from here on, up to 100, is in percent.
@@ -98,6 +100,12 @@ impl Description {
                 let problem = format!("must be three finite numbers: [x, y, yaw], metres and radians{sign}");
                 wrong("origin", problem)
             })?;
+        if origin[..2].iter().any(|value| value.abs() > FARTHEST_ORIGIN) {
+            let problem = format!(
+                "is farther than {FARTHEST_ORIGIN:e} m from the origin of the map frame, on no map of the earth"
+            );
+            return Err(wrong("origin", problem));
+        }
         let mut thresholds = [0.0; 2];
         let written = [fields.occupied_thresh, fields.free_thresh];
         for ((threshold, (field, usual)), written) in thresholds.iter_mut().zip(USUAL_THRESHOLDS).zip(written) {

@@ -11,6 +11,8 @@ use nalgebra::{Isometry2, Vector2};
 use std::io;
 use std::path::{Path, PathBuf};
 
+/// The maximum size of a YAML file, bytes: real ones have some hundreds, and YAML takes a hundred times its size when it is read.
+const LONGEST_DESCRIPTION: u64 = 1 << 20;
 /// The maximum size of an image file, bytes.
 const LARGEST_IMAGE: u64 = 512 << 20;
 /// The extensions of images that are looked for beside a YAML file with the same name.
@@ -98,7 +100,8 @@ pub fn image_of(yaml: &Path) -> Result<PathBuf, MapFileError> {
 /// The content of the YAML file, with the image's path relative to the working directory; and the path in the file if
 /// that image is missing and another one is used.
 fn describe(yaml: &Path) -> Result<(Description, Option<PathBuf>), MapFileError> {
-    let text = input_file::read_text(yaml).map_err(|error| MapFileError::Read { path: yaml.to_owned(), error })?;
+    let text = input_file::read_text(yaml, LONGEST_DESCRIPTION)
+        .map_err(|error| MapFileError::Read { path: yaml.to_owned(), error })?;
     let description = Description::parse(&text, yaml)?;
     let named = yaml.parent().unwrap_or(Path::new("")).join(&description.image);
     let (image, missing) = match image_beside_yaml(&named, yaml) {

@@ -202,6 +202,9 @@ fn invalid_values_are_reported_with_valid_ones() {
     for value in ["[0]", "[0, 0, 0, 0]", "[0, .nan, 0]", "[]"] {
         assert!(with("[1, -2.5, 0.5]", value).contains("`origin` must be three finite numbers"));
     }
+    for value in ["[1e9, 0, 0]", "[0, -1e300, 0]"] {
+        assert!(with("[1, -2.5, 0.5]", value).contains("`origin` is farther than 1e8 m"));
+    }
     for value in ["1.5", "-0.1", "255", ".nan"] {
         assert!(with("0.65", value).contains("it must be between 0 and 1"), "{}", with("0.65", value));
     }

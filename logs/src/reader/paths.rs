@@ -93,6 +93,7 @@ fn advice_in(folder: &Path) -> String {
             .iter()
             .take(MOST_ENTRIES)
             .filter(|path| is_meant(path))
+            .take(MOST_NAMED + 1)
             .map(|path| path.display().to_string())
             .collect();
         let more = if paths.len() > MOST_NAMED { " ..." } else { "" };
@@ -105,7 +106,8 @@ fn advice_in(folder: &Path) -> String {
 
 fn described_files(description: &Path) -> Result<Vec<PathBuf>, ReadError> {
     let wrong = |cause: String| ReadError::BagDescription { path: description.to_owned(), cause };
-    let text = input_file::read_text(description).map_err(|error| ReadError::io(description, error))?;
+    let text = input_file::read_text(description, input_file::LONGEST_TEXT)
+        .map_err(|error| ReadError::io(description, error))?;
     // A recorder that was killed, or had a full disk, may leave the file empty.
     if text.trim_matches(|one: char| one.is_whitespace() || one == '\0').is_empty() {
         return undescribed_files(folder_of(description));

@@ -23,6 +23,11 @@ pub enum LogWriteError {
     /// The disk is full.
     #[error("there is no room left for {0}; free space on its disk, or name a file elsewhere")]
     NoRoom(PathBuf),
+    /// The file would be larger than a limit.
+    #[error(
+        "{0} would be larger than the file system or `ulimit -f` allows; raise the limit, or name a file elsewhere"
+    )]
+    TooLarge(PathBuf),
     /// Another error of the file system.
     #[error("{path}: {source}")]
     Io {
@@ -57,7 +62,8 @@ impl LogWriteError {
             ErrorKind::IsADirectory => Self::IsFolder(path),
             ErrorKind::NotFound | ErrorKind::NotADirectory => Self::NoFolder(folder_of(&path).to_owned()),
             ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => Self::Denied(path),
-            ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => Self::NoRoom(path),
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Self::NoRoom(path),
+            ErrorKind::FileTooLarge => Self::TooLarge(path),
             _ => Self::Io { path, source },
         }
     }

@@ -1,5 +1,6 @@
 //! A run of a pipeline by the options of a command.
 
+mod expected_robots;
 mod inputs;
 mod options;
 mod outputs;
@@ -26,6 +27,7 @@ use crate::summary::RunSummary;
 use crate::terminal::{eprint_line, print, print_line, width};
 use crate::trace;
 use anyhow::Result;
+use expected_robots::add_unused_robots;
 use gridweave_logs::bag::Bag;
 use gridweave_logs::names::name_map_files;
 use gridweave_runtime::engine::{self, EngineKind, Observer, RunError, RunReport, processes};
@@ -135,7 +137,8 @@ impl Job<'_> {
             }
         };
         let written = report.map_err(anyhow::Error::from).and_then(|report| {
-            let summary = RunSummary::new(sinks.summary()?, &report);
+            let mut summary = RunSummary::new(sinks.summary()?, &report);
+            add_unused_robots(self, &pipeline, &mut summary);
             let text = summary.to_json() + "\n";
             outputs.place(self.options.summary.as_deref().map(|path| (path, text.as_str())))?;
             Ok((report, summary))

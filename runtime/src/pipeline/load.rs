@@ -24,7 +24,7 @@ impl Pipeline {
     /// The file cannot be read, or it has errors, all of which are returned.
     pub fn load(path: &Path, registry: &Registry, overrides: &Overrides) -> Result<Self, PipelineErrors> {
         let name = path.display().to_string();
-        match input_file::read_text(path) {
+        match input_file::read_text(path, input_file::LONGEST_TEXT) {
             Ok(text) => Self::parse(&name, &text, registry, overrides),
             Err(error) => Err(PipelineErrors::of_whole(&name, format!("cannot read the pipeline `{name}`: {error}"))),
         }

@@ -4,6 +4,23 @@ use super::ScanMapperParameters;
 use crate::shared::geometry::{Point2, Pose2, pose};
 use gridweave_runtime::ros::RangeScan;
 
+/// Beams of a scan that is used, at most. Lidars that look into one plane send some thousands.
+const MOST_BEAMS: usize = 100_000;
+
+/// Why a scan cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ScanError {
+    /// A number for all of its beams is not finite.
+    #[error("angle_min, angle_increment, time_increment or the mount of the lidar is not finite")]
+    NotFinite,
+    /// Its beams would go back in time.
+    #[error("time_increment is below 0")]
+    BackInTime,
+    /// Its size is none of a lidar.
+    #[error("a scan has more than {MOST_BEAMS} beams")]
+    TooManyBeams,
+}
+
 /// A beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BaseBeam {
@@ -30,13 +47,21 @@ pub struct ScanBeams {
 
 impl ScanBeams {
     /// Extracts the beams of a scan. Ranges below the lidar's minimum or not a number are left out; those of its
-    /// maximum, as many drivers report where nothing is, above it, or infinite, have hit nothing (REP 117). `None` if
-    /// the scan is invalid.
-    pub fn of(scan: &RangeScan, parameters: &ScanMapperParameters) -> Option<Self> {
+    /// maximum, as many drivers report where nothing is, above it, or infinite, have hit nothing (REP 117).
+    ///
+    /// # Errors
+    /// The numbers for all beams are not finite or in no order, or there are too many beams.
+    pub fn of(scan: &RangeScan, parameters: &ScanMapperParameters) -> Result<Self, ScanError> {
         let RangeScan { x, y, yaw, angle_min, angle_increment, time_increment, .. } = *scan;
         let numbers = [x, y, yaw, angle_min, angle_increment, time_increment];
-        if !numbers.iter().all(|number| number.is_finite()) || time_increment < 0.0 {
-            return None;
+        if !numbers.iter().all(|number| number.is_finite()) {
+            return Err(ScanError::NotFinite);
+        }
+        if time_increment < 0.0 {
+            return Err(ScanError::BackInTime);
+        }
+        if scan.ranges.len() > MOST_BEAMS {
+            return Err(ScanError::TooManyBeams);
         }
         let (nearest, farthest) = (f64::from(scan.range_min), f64::from(scan.range_max));
         // A lidar that reports no limit has none.
@@ -59,7 +84,7 @@ impl ScanBeams {
         });
         let beams = beams.collect();
         let duration = scan.ranges.len().saturating_sub(1) as f64 * time_increment;
-        Some(Self { transform_base_lidar: pose(x, y, yaw), beams, duration })
+        Ok(Self { transform_base_lidar: pose(x, y, yaw), beams, duration })
     }
 
     /// The scan of a robot that stands still where it is at the first beam; `moved(delay)` is where it really is that many

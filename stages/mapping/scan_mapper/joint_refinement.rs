@@ -58,7 +58,7 @@ impl<'a> MappedRobot<'a> {
         if robot.bad_scans().is_some() || robot.is_mirrored() {
             return None;
         }
-        let map = cleaned(robot.map().0?)?;
+        let map = cleaned(robot.map()?)?;
         Some(Self { source: Source::Scans(robot.slam_map_mut()?), map })
     }
 

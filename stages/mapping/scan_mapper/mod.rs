@@ -41,7 +41,7 @@ mod tests;
 #[cfg(test)]
 mod trouble_tests;
 
-pub use beams::{BaseBeam, ScanBeams};
+pub use beams::{BaseBeam, ScanBeams, ScanError};
 pub use parameters::{MappingMode, ScanMapperParameters};
 pub use scan_map::{ScanMap, TooLarge};
 pub use stage::kind;

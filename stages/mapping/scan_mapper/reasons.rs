@@ -1,6 +1,7 @@
 //! Why a robot has no map, or only a part of one, and what would mend it.
 
 use super::slam_map::{BadScans, LossCause, ScanFault};
+use crate::shared::geometry::wrap_angle;
 
 /// How to use what a robot saw before and after it lost its way.
 const CUT_THERE: &str =
@@ -30,6 +31,28 @@ pub(super) fn upside_down(name: &str) -> String {
     )
 }
 
+/// That the ways of a robot are `scale` times as long as by its odometry.
+pub(super) fn wrong_scale(name: &str, scale: f64, outcome: &str) -> String {
+    let (percent, size) = (100.0 * (1.0 / scale - 1.0), if scale < 1.0 { "long" } else { "short" });
+    format!(
+        "the odometry of {name} is {:.0} % too {size} by its scans, {outcome}: are its wheels as large as its driver takes them to \
+         be?",
+        percent.abs()
+    )
+}
+
+/// That the ways of a robot by its scans are turned against those by odometry, with the yaw of its lidar as it is given, radians.
+pub(super) fn turned_lidar(name: &str, turn: f64, yaw: f64) -> String {
+    let side = if turn < 0.0 { "right" } else { "left" };
+    format!(
+        "{name} moves {:.0} degrees farther to the {side} by its scans than by its odometry, as if its lidar were mounted with another \
+         yaw: its poses, and the frame of its map, are turned by that. Log the mount on /tf_static, or give it: \
+         --lidar {name}=X,Y,{:.3}",
+        turn.to_degrees().abs(),
+        wrap_angle(yaw - turn)
+    )
+}
+
 /// Where a robot has lost its way, so many seconds after its first scan.
 pub(super) fn lost_way(name: &str, seconds: f64, cause: LossCause) -> String {
     let (why, cure) = match cause {
@@ -56,6 +79,10 @@ pub(super) fn lost_way(name: &str, seconds: f64, cause: LossCause) -> String {
     )
 }
 
+/// Why scans are not in a map.
+pub(super) const TOO_LARGE: &str =
+    "its map would get too large. For a larger one with larger cells give --set mapper.resolution=METRES";
+
 pub(super) fn too_large(name: &str) -> String {
-    format!("scans of {name} were left out: its map would get too large")
+    format!("scans of {name} were left out: {TOO_LARGE}")
 }

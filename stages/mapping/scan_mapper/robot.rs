@@ -4,7 +4,7 @@ use super::along_odometry::{ScanTimes, add_along_odometry};
 use super::continuous_odometry::ContinuousOdometry;
 use super::scan_odometry::ScanOdometry;
 use super::slam_map::{BadScans, LossCause, LostWay, SlamMap, TagSighting};
-use super::{ScanBeams, ScanMap, ScanMapperParameters, TooLarge};
+use super::{ScanBeams, ScanError, ScanMap, ScanMapperParameters, TooLarge};
 use crate::mapping::slam::Contradictions;
 use crate::shared::geometry::{Point2, Pose2, pose};
 use crate::shared::robot_clock::RobotClock;
@@ -61,6 +61,8 @@ pub(super) struct Robot {
     first_scan: Option<LogTime>,
     /// Number of scans so far.
     scans: usize,
+    /// Number of scans that cannot be used, and why the first cannot.
+    rejected: Option<(usize, ScanError)>,
     /// Times of the first and the last scan in the map.
     pub(super) drawn: Option<[LogTime; 2]>,
     /// Time of the last scan in the map that was sent.
@@ -84,6 +86,7 @@ impl Robot {
             waiting_tags: VecDeque::new(),
             first_scan: None,
             scans: 0,
+            rejected: None,
             drawn: None,
             sent_until: None,
             is_loss_reported: false,
@@ -164,6 +167,16 @@ impl Robot {
         (is_by_odometry && self.continuous.stands_still()).then_some(self.scans)
     }
 
+    /// Counts a scan that cannot be used.
+    pub(super) fn reject_scan(&mut self, problem: ScanError) {
+        self.rejected.get_or_insert((0, problem)).0 += 1;
+    }
+
+    /// Number of its scans, if none can be used, and why the first cannot.
+    pub(super) fn rejected_scans(&self) -> Option<(usize, ScanError)> {
+        self.rejected.filter(|_| self.scans == 0)
+    }
+
     /// Number of its scans, if there are any and none is in a map.
     pub(super) fn unused_scans(&self) -> Option<usize> {
         (self.drawn.is_none() && self.scans > 0).then_some(self.scans)
@@ -206,6 +219,20 @@ impl Robot {
             Localization::ByOdometry(slam) => Some(slam.odometry_scale()),
             _ => None,
         }
+    }
+
+    /// The factor and the turn to the left, radians, by which its ways by odometry become those by its scans, and the yaw of its
+    /// lidar as it is given. `None` if none is steady, or its scans are not registered along odometry.
+    pub(super) fn similarity_to_scans(&self) -> Option<(f64, f64, f64)> {
+        match &self.localization {
+            Localization::ByOdometry(slam) => slam.similarity_to_scans(),
+            _ => None,
+        }
+    }
+
+    /// Whether none of its scans, which are registered, has hit anything.
+    pub(super) fn sees_nothing(&self) -> bool {
+        self.slam_map().is_some_and(SlamMap::sees_nothing)
     }
 
     /// Seconds from the first scan to where it has lost its way, and why; given once.
@@ -296,17 +323,21 @@ impl Robot {
         }
     }
 
-    /// The map so far, `None` if nothing is known, and how many scans were left out of it just then, as it would get
-    /// too large.
-    pub(super) fn map(&mut self) -> (Option<SnapshotMap>, usize) {
+    /// The map so far, `None` if nothing is known.
+    pub(super) fn map(&mut self) -> Option<SnapshotMap> {
         match &mut self.localization {
-            Localization::NotYet => (None, 0),
-            Localization::ByPoses(map) => (map.snapshot(), 0),
+            Localization::NotYet => None,
+            Localization::ByPoses(map) => map.snapshot(),
             Localization::ByOdometry(slam) | Localization::ByScans(slam, _) => {
-                let left_out = slam.draw();
-                (slam.map().snapshot(), left_out)
+                slam.draw();
+                slam.map().snapshot()
             }
         }
+    }
+
+    /// Takes the number of scans that were left out of the map by SLAM since the last time, as it would get too large.
+    pub(super) fn take_left_out(&mut self) -> usize {
+        self.slam_map_mut().map_or(0, SlamMap::take_left_out)
     }
 
     /// Whether its scans turn against its odometry.

@@ -37,6 +37,8 @@ pub(super) struct SlamMap {
     map: ScanMap,
     /// Number of scans in the map.
     drawn: usize,
+    /// Scans that are not in the map, as it would get too large, and were not reported yet.
+    left_out: usize,
     first_unmatched: Option<LogTime>,
     lost_way: Option<LostWay>,
     max_contradicting: f64,
@@ -100,6 +102,7 @@ impl SlamMap {
             scans: Vec::new(),
             map: ScanMap::new(parameters),
             drawn: 0,
+            left_out: 0,
             first_unmatched: None,
             lost_way: None,
             max_contradicting: parameters.max_contradicting,
@@ -120,6 +123,18 @@ impl SlamMap {
     /// Length of the ways of the robot as a share of that by odometry.
     pub(super) fn odometry_scale(&self) -> f64 {
         self.trajectory.odometry_scale()
+    }
+
+    /// The factor and the turn to the left, radians, by which the ways of the robot by odometry become those by its scans, and
+    /// the yaw of the lidar as it is given. `None` if none is steady.
+    pub(super) fn similarity_to_scans(&self) -> Option<(f64, f64, f64)> {
+        let (factor, turn) = self.trajectory.similarity_to_scans()?;
+        Some((factor, turn, self.scans.last()?.transform_base_lidar.rotation.angle()))
+    }
+
+    /// Whether no scan has hit anything.
+    pub(super) fn sees_nothing(&self) -> bool {
+        self.trajectory.sees_nothing()
     }
 
     /// Time of the last scan.
@@ -222,7 +237,7 @@ impl SlamMap {
     /// Scans have moved: the map is drawn again.
     fn forget_map(&mut self) {
         self.map.clear();
-        self.drawn = 0;
+        (self.drawn, self.left_out) = (0, 0);
         self.tested = None;
     }
 
@@ -231,9 +246,8 @@ impl SlamMap {
         self.transform_map_trajectory() * self.trajectory.poses()[scan]
     }
 
-    /// Draws the scans that are not in the map. Returns how many were left out, as the map would get too large.
-    pub(super) fn draw(&mut self) -> usize {
-        let mut left_out = 0;
+    /// Draws the scans that are not in the map.
+    pub(super) fn draw(&mut self) {
         let mut beams = ScanBeams { transform_base_lidar: Pose2::identity(), beams: Vec::new(), duration: 0.0 };
         while let Some(scan) = self.scans.get(self.drawn) {
             beams.transform_base_lidar = scan.transform_base_lidar;
@@ -246,9 +260,13 @@ impl SlamMap {
             }));
             let at = self.pose(self.drawn);
             self.drawn += 1;
-            left_out += usize::from(self.map.draw(&beams, |_| Some(at)).is_err());
+            self.left_out += usize::from(self.map.draw(&beams, |_| Some(at)).is_err());
         }
-        left_out
+    }
+
+    /// Takes the number of scans that were left out of the map since the last time, as it would get too large.
+    pub(super) fn take_left_out(&mut self) -> usize {
+        std::mem::take(&mut self.left_out)
     }
 
     /// The map of the scans that were drawn.

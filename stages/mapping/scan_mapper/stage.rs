@@ -1,10 +1,11 @@
 //! The stage `scan_mapper`.
 
 use super::joint_refinement::refine_together;
-use super::reasons::{lost_way, too_large, upside_down, why_bad};
+use super::reasons::{TOO_LARGE, lost_way, too_large, turned_lidar, upside_down, why_bad, wrong_scale};
 use super::robot::{Robot, ScanOutcome};
 use super::slam_map::TagSighting;
 use super::{MappingMode, ScanBeams, ScanMapperParameters};
+use crate::mapping::slam::MOST_SCALE_ERROR;
 use crate::shared::geometry::{GridGeometry, Pose2};
 use crate::shared::robot_clock::Leap;
 use crate::shared::scan_grid::SnapshotMap;
@@ -44,6 +45,9 @@ pub fn kind() -> StageKind {
 const SCANS_OF_A_DRIVE: usize = 50;
 /// Error of the ways of odometry that is worth a warning, as a share.
 const ODOMETRY_ERROR: f64 = 0.05;
+/// Turn of the ways by scans against those by odometry that is worth a warning, radians: lidars are mounted to a degree or two, and
+/// odometry that is late adds as much.
+const LIDAR_YAW_ERROR: f64 = 0.12;
 
 struct ScanMapper {
     parameters: ScanMapperParameters,
@@ -132,9 +136,13 @@ impl ScanMapper {
         let Some(robot) = self.robot(message.robot(), output) else { return Ok(()) };
         let (time, leap) = robot.clock.time("scan", message.header.stamp, message.log_time());
         warn_of_leap(message.robot(), leap, output);
-        let Some(scan) = scan else {
-            output.warn(format!("scans of {} with angles or times that are not finite are left out", message.robot()));
-            return Ok(());
+        let scan = match scan {
+            Ok(scan) => scan,
+            Err(problem) => {
+                robot.reject_scan(problem);
+                output.warn(format!("scans of {} were left out: {problem}", message.robot()));
+                return Ok(());
+            }
         };
         robot.add_scan(time, scan);
         robot.decide(&parameters, false);
@@ -239,6 +247,9 @@ impl ScanMapper {
             output.count("scans that see walls again", contradictions.revisiting as u64);
             output.count("scans that contradict walls", contradictions.contradicting.len() as u64);
         }
+        if robot.sees_nothing() {
+            return Ok(());
+        }
         if let Some(bad) = robot.bad_scans() {
             return send_lost(name, &why_bad(&bad, bad.since.seconds_since(first)), output);
         }
@@ -287,12 +298,14 @@ fn explain(
         ));
     }
     if let Some(scale) = robot.odometry_scale().filter(|scale| (scale - 1.0).abs() > ODOMETRY_ERROR) {
-        let (percent, size) = (100.0 * (1.0 / scale - 1.0), if scale < 1.0 { "long" } else { "short" });
-        output.warn(format!(
-            "the odometry of {name} is {:.0} % too {size} by its scans, and is corrected by that: are its wheels as large as its \
-             driver takes them to be?",
-            percent.abs()
-        ));
+        output.warn(wrong_scale(name, scale, "and is corrected by that"));
+    } else if let Some((scale, ..)) =
+        robot.similarity_to_scans().filter(|found| (found.0 - 1.0).abs() > MOST_SCALE_ERROR)
+    {
+        output.warn(wrong_scale(name, scale, "which is more than is corrected"));
+    }
+    if let Some((_, turn, yaw)) = robot.similarity_to_scans().filter(|found| found.1.abs() > LIDAR_YAW_ERROR) {
+        output.warn(turned_lidar(name, turn, yaw));
     }
     if let Some(scans) = robot.scans_at_a_standstill().filter(|scans| *scans >= SCANS_OF_A_DRIVE) {
         output.warn(format!(
@@ -306,8 +319,15 @@ fn explain(
         );
         return send_lost(name, &reason, output);
     }
-    if robot.drawn.is_some() && robot.map().0.is_none() && robot.bad_scans().is_none() {
-        let reason = format!("its scans show nothing within {} m", parameters.max_range);
+    if let Some((scans, problem)) = robot.rejected_scans() {
+        return send_lost(name, &format!("none of its {scans} scans can be used: {problem}"), output);
+    }
+    if robot.drawn.is_some() && (robot.sees_nothing() || robot.map().is_none() && robot.bad_scans().is_none()) {
+        let is_too_large = robot.is_by_slam() && !robot.sees_nothing();
+        let reason = match is_too_large {
+            true => TOO_LARGE.to_owned(),
+            false => format!("its scans show nothing within {} m", parameters.max_range),
+        };
         return send_lost(name, &reason, output);
     }
     Ok(())
@@ -326,8 +346,8 @@ fn warn_of_leap(name: &str, leap: Option<Leap>, output: &Output<Drawn>) {
 }
 
 fn send_map(name: &str, robot: &mut Robot, drawn_until: LogTime, output: &Output<Drawn>) -> Result<(), StageError> {
-    let (map, left_out) = robot.map();
-    (0..left_out).for_each(|_| output.warn(too_large(name)));
+    let map = robot.map();
+    (0..robot.take_left_out()).for_each(|_| output.warn(too_large(name)));
     let Some(map) = map else { return Ok(()) };
     let prefix = map.geometry.prefix(Header::new(drawn_until, map_frame(name, robot)));
     output.map.send_grid(name, &prefix, |blank| blank.copy_cells(&map.cells))

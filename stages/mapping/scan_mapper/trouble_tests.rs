@@ -52,6 +52,72 @@ fn odometry_that_starts_again_goes_on_where_it_was() {
 }
 
 #[test]
+fn a_lidar_that_is_mounted_with_another_yaw_than_given_is_named() {
+    let turned = |by: f64| move |scan: RangeScan| RangeScan { yaw: scan.yaw + by, ..scan };
+    for (by, text) in [(1.5, "robot1 moves 86 degrees farther to the left"), (-0.2, "11 degrees farther to the right")]
+    {
+        let mut bench = drive(truth, turned(by));
+        assert!(bench.map(30.0).0.is_some());
+        assert!(warns(&mut bench, text), "{:?}", bench.0.warnings());
+        let is_given = ["0.39", "0.40", "0.41"].iter().any(|yaw| warns(&mut bench, &format!("robot1=X,Y,{yaw}")));
+        assert!(is_given, "{:?}", bench.0.warnings());
+    }
+    let mut right = drive(truth, |scan| scan);
+    assert!(right.map(30.0).0.is_some() && !warns(&mut right, "farther to the"), "{:?}", right.0.warnings());
+}
+
+#[test]
+fn odometry_twice_as_long_is_named() {
+    let long = |seconds| Pose2::from_parts((2.0 * truth(seconds).translation.vector).into(), truth(seconds).rotation);
+    let mut bench = drive(long, |scan| scan);
+    let _ = bench.map(30.0);
+    assert!(warns(&mut bench, "too long by its scans"), "{:?}", bench.0.warnings());
+}
+
+#[test]
+fn scans_that_cannot_be_used_or_show_nothing_are_reasons_without_a_map() {
+    let none = |scan: RangeScan| RangeScan { angle_increment: f64::NAN, ..scan };
+    let back = |scan: RangeScan| RangeScan { time_increment: -1e-4, ..scan };
+    let many = |scan: RangeScan| RangeScan { ranges: vec![2.0; 100_001], ..scan };
+    let blind = |scan: RangeScan| RangeScan { ranges: vec![f32::NAN; BEAMS], ..scan };
+    let changes: [(&dyn Fn(RangeScan) -> RangeScan, &str); 4] = [
+        (&none, "none of its 300 scans can be used: angle_min, angle_increment"),
+        (&back, "none of its 300 scans can be used: time_increment is below 0"),
+        (&many, "none of its 300 scans can be used: a scan has more than 100000 beams"),
+        (&blind, "its scans show nothing within"),
+    ];
+    for (change, reason) in changes {
+        let mut bench = drive(truth, change);
+        assert!(bench.map(30.0).0.is_none());
+        let lost = lost(&mut bench);
+        assert!(lost.len() == 1 && lost[0].contains(reason), "{lost:?}");
+    }
+}
+
+#[test]
+fn scans_that_are_left_out_of_a_map_that_would_get_too_large_are_counted() {
+    // A room of 70 m in cells of 5 mm.
+    let mut bench = Bench::new("mode = 'offline'\nresolution = 0.005\nmax_range = 500.0");
+    for tick in 0..60 {
+        let seconds = 0.1 * f64::from(tick);
+        let (small, [x, y, yaw]) = (truth(seconds / 7.0), LIDAR);
+        let at = Pose2::from_parts((7.0 * small.translation.vector).into(), small.rotation);
+        let ranges = still_ranges(seconds / 7.0).iter().map(|range| 7.0 * range).collect();
+        bench.pose("odometry", "robot1/odom", seconds, at);
+        let of_large = RangeScan { x: 7.0 * x, y: 7.0 * y, yaw, ranges, range_max: 1000.0, ..still(seconds) };
+        bench.scan(seconds, &of_large);
+    }
+    assert!(bench.map(6.0).0.is_none());
+    assert!(
+        warns(&mut bench, "scans of robot1 were left out: its map would get too large"),
+        "{:?}",
+        bench.0.warnings()
+    );
+    let lost = lost(&mut bench);
+    assert!(lost.len() == 1 && lost[0].contains("its map would get too large"), "{lost:?}");
+}
+
+#[test]
 fn of_a_lidar_that_is_upside_down_no_mirrored_map_is_drawn() {
     let upside_down = |scan: RangeScan| RangeScan {
         yaw: -scan.yaw,

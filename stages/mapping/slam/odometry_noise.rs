@@ -1,7 +1,7 @@
 //! Noise of the odometry of a robot, estimated from the scans that were registered.
 
 use crate::shared::geometry::{Pose2, wrap_angle};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// Least standard deviation of odometry, even for a robot that stands still, metres and radians.
 const LEAST_DEVIATION: [f64; 2] = [0.02, 0.01];
@@ -16,13 +16,48 @@ const PRIOR_FACTOR: f64 = 1.5;
 const SCALE_DEVIATION: f64 = 0.03;
 /// Standard deviation of the way between two scans as their walls show it, metres.
 const WAY_DEVIATION: f64 = 0.02;
-/// Largest difference of the scale of one step from the estimate: more is a slip, or a wrong registration.
-const MOST_DIFFERENCE: f64 = 0.3;
+/// Largest difference of the scale of one step from the estimate, as a share: more is a slip, or a wrong registration.
+pub const MOST_SCALE_ERROR: f64 = 0.3;
 
 /// Least root of the summed squares of the turns, radians, from which they show which way the scans turn, and the
 /// correlation of both turns below which they turn against odometry.
 const LEAST_TURNS: f64 = 1.0;
 const OPPOSITE: f64 = -0.5;
+
+/// Information of the walls on the place of a step in each direction, as a multiple of that of odometry, from which the step as
+/// registered is theirs.
+const SHOWN_BY_WALLS: f64 = 4.0;
+/// Least way, metres, of such steps, and least correlation of both ways, by which they show how odometry lies to the scans.
+const LEAST_WAY: f64 = 5.0;
+const STEADY: f64 = 0.9;
+
+/// Ways between scans by odometry and by the walls, where these show them well.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct ComparedWays {
+    /// Sum of the ways by odometry, metres.
+    way: f64,
+    /// Sums of the squared ways by odometry and by the walls.
+    squares: [f64; 2],
+    /// Sum of the products of both, as vectors: along the way by odometry, and to its left.
+    products: Vector2<f64>,
+}
+
+impl ComparedWays {
+    fn add(&mut self, by_odometry: &Vector2<f64>, by_walls: &Vector2<f64>) {
+        self.way += by_odometry.norm();
+        self.squares[0] += by_odometry.norm_squared();
+        self.squares[1] += by_walls.norm_squared();
+        self.products += Vector2::new(by_odometry.dot(by_walls), by_odometry.perp(by_walls));
+    }
+
+    /// The similarity by which the ways by the walls are those by odometry: a factor, and a turn to the left, radians. `None` if
+    /// none is steady.
+    fn similarity(&self) -> Option<(f64, f64)> {
+        let product = self.products.norm();
+        let is_steady = self.way >= LEAST_WAY && product >= STEADY * (self.squares[0] * self.squares[1]).sqrt();
+        is_steady.then(|| (product / self.squares[0], self.products.y.atan2(self.products.x)))
+    }
+}
 
 /// How uncertain the steps of odometry are: standard deviations in proportion to the way and the turn, with factors
 /// that are estimated from the steps so far; and by which factor its ways are too long or too short.
@@ -36,18 +71,32 @@ pub struct OdometryNoise {
     turns: [f64; 3],
     /// Sums of the products of the ways by odometry and by walls, and of the squared ways by odometry, in variances.
     ways: [f64; 2],
+    compared: ComparedWays,
 }
 
 impl OdometryNoise {
     /// Noise of which nothing has been seen: `share` is the standard deviation as a share of the way and the turn.
     pub fn new(share: f64) -> Self {
         let squares = [PRIOR_STEPS * PRIOR_FACTOR * PRIOR_FACTOR; 2];
-        Self { share, steps: PRIOR_STEPS, squares, turns: [0.0; 3], ways: [SCALE_DEVIATION.powi(-2); 2] }
+        Self {
+            share,
+            steps: PRIOR_STEPS,
+            squares,
+            turns: [0.0; 3],
+            ways: [SCALE_DEVIATION.powi(-2); 2],
+            compared: ComparedWays::default(),
+        }
     }
 
     /// Length of a way by the walls as a share of that by odometry.
     pub fn scale(&self) -> f64 {
         self.ways[0] / self.ways[1]
+    }
+
+    /// The factor and the turn to the left, radians, by which ways by odometry become those by the walls, where these show them
+    /// well; no step is left out. `None` if none is steady.
+    pub fn similarity_to_walls(&self) -> Option<(f64, f64)> {
+        self.compared.similarity()
     }
 
     /// A step of odometry with its way in the scale of the walls.
@@ -85,6 +134,10 @@ impl OdometryNoise {
     /// walls alone say about it, as an inverse covariance. A step that no wall constrains is as odometry has it, but its
     /// covariance is that of odometry, so that it changes nothing (expectation maximisation).
     pub fn learn(&mut self, moved: &Pose2, registered: &Pose2, covariance: &Matrix3<f64>, by_walls: &Matrix3<f64>) {
+        let least = by_walls.fixed_view::<2, 2>(0, 0).into_owned().symmetric_eigenvalues().min();
+        if least >= SHOWN_BY_WALLS * self.deviations(moved)[0].powi(-2) {
+            self.compared.add(&(moved.translation.vector / self.scale()), &registered.translation.vector);
+        }
         self.learn_scale(moved, registered, by_walls);
         let [position, yaw] = self.assumed(moved);
         let off = registered.translation.vector - moved.translation.vector;
@@ -113,7 +166,7 @@ impl OdometryNoise {
         let share = information / (information + self.deviations(moved)[0].powi(-2));
         let by_walls = along.dot(&registered.translation.vector) - (1.0 - share) * way;
         // Written so that a value that is not a number fails it.
-        if (by_walls - share * way).abs() < MOST_DIFFERENCE * share * way {
+        if (by_walls - share * way).abs() < MOST_SCALE_ERROR * share * way {
             let by_odometry = way / scale;
             let weight = by_odometry / WAY_DEVIATION.powi(2);
             self.ways[0] += weight * by_walls;
@@ -161,6 +214,34 @@ mod tests {
         // What was assumed before the first step still counts a tenth.
         assert!((noise.scale() - 0.91).abs() < 0.002, "{}", noise.scale());
         assert_eq!(blind.scale(), 1.0);
+    }
+
+    #[test]
+    fn a_lidar_that_is_turned_and_odometry_twice_as_long_are_noticed() {
+        let well = Matrix3::identity() * 1e8;
+        let similarity = |turn: f64, factor: f64, slips: usize| {
+            let mut noise = OdometryNoise::new(0.1);
+            for step in 0..60 {
+                let moved = pose(0.3, 0.02, if step % 2 == 0 { 0.3 } else { -0.3 });
+                let registered = nalgebra::UnitComplex::new(turn) * moved.translation.vector * factor;
+                let registered = if step < slips { Vector2::zeros() } else { registered };
+                let registered = Pose2::from_parts(registered.into(), moved.rotation);
+                noise.learn(&noise.corrected(&moved), &registered, &Matrix3::zeros(), &well);
+                assert!(step > 10 || noise.similarity_to_walls().is_none(), "a few steps tell nothing");
+            }
+            noise.similarity_to_walls().unwrap()
+        };
+        for (turn, factor) in [(0.0, 1.0), (-1.5, 1.0), (3.0, 1.0), (0.2, 0.5)] {
+            let (found, turned) = similarity(turn, factor, 0);
+            assert!((found - factor).abs() < 1e-6 && (turned - turn).abs() < 1e-6, "{found} {turned}");
+        }
+        let (found, turned) = similarity(0.0, 1.0, 6);
+        assert!(found > 0.85 && turned == 0.0, "{found} {turned}");
+        // Along a corridor the walls do not show the way.
+        let mut blind = OdometryNoise::new(0.1);
+        let across = Matrix3::from_diagonal(&Vector3::new(0.0, 1e8, 1e8));
+        (0..60).for_each(|_| blind.learn(&pose(0.3, 0.0, 0.0), &pose(0.1, 0.2, 0.0), &Matrix3::zeros(), &across));
+        assert_eq!(blind.similarity_to_walls(), None);
     }
 
     #[test]

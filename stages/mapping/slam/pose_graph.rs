@@ -2,7 +2,7 @@
 
 use crate::shared::geometry::relative_pose::{self, rotation_of_pose};
 use crate::shared::geometry::{Point2, Pose2};
-use crate::shared::sparse::{Columns, SimilarSystems, factor, nested_dissection};
+use crate::shared::sparse::{Columns, SimilarSystems, factor, minimum_degree};
 use nalgebra::{Matrix2, Matrix3, UnitComplex, Vector3};
 
 /// Largest number of Gauss-Newton steps.
@@ -248,8 +248,7 @@ fn elimination_order(nodes: &[Pose2], constraints: &[Constraint]) -> Vec<usize> 
         of_node.sort_unstable();
         of_node.dedup();
     }
-    let places: Vec<Point2> = nodes.iter().map(|pose| pose.translation.vector.into()).collect();
-    nested_dissection(&places, &neighbours)
+    minimum_degree(neighbours)
 }
 
 #[cfg(test)]

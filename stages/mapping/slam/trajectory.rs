@@ -150,6 +150,11 @@ impl Trajectory {
         self.unmatched
     }
 
+    /// Whether no scan has hit anything.
+    pub fn sees_nothing(&self) -> bool {
+        self.scans.iter().all(Vec::is_empty)
+    }
+
     /// Whether the robot turns one way by odometry and the other way by its scans.
     pub fn turns_against_odometry(&self) -> bool {
         self.noise.turns_against_scans()
@@ -158,6 +163,12 @@ impl Trajectory {
     /// Length of the ways of the robot as a share of that by odometry.
     pub fn odometry_scale(&self) -> f64 {
         self.noise.scale()
+    }
+
+    /// The factor and the turn to the left, radians, by which the ways of the robot by odometry become those by its scans.
+    /// `None` if none is steady.
+    pub fn similarity_to_scans(&self) -> Option<(f64, f64)> {
+        self.noise.similarity_to_walls()
     }
 
     /// Length of the path of the robot by odometry, metres.

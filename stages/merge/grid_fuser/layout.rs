@@ -2,6 +2,7 @@
 
 use super::{KnownArea, PlacedGrid};
 use crate::shared::geometry::{GridGeometry, Point2, most_cells_over, pose};
+use nalgebra::Vector2;
 
 /// A rectangle along the world's axes, in cells of the fused grid, counted from the anchor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +40,9 @@ pub enum LeftOut {
     /// Its pose is not finite.
     #[error("its pose is not finite")]
     NotFinite,
+    /// It is longer itself than the grid may be.
+    #[error("it is longer than `max_extent`, {0} m: allow a longer fused map, --set fuser.max_extent=METRES")]
+    TooLongAlone(f64),
     /// A side of the grid would be too long.
     #[error("it is so far away that the fused map would be longer than `max_extent`, {0} m; {DOUBT}")]
     TooLong(f64),
@@ -62,6 +66,9 @@ pub fn layout_of(maps: &[(PlacedGrid<'_>, &KnownArea)], lattice: &CellLattice) -
         let fits = extent(map, area, lattice).and_then(|extent| {
             let Some(extent) = extent else { return Ok(()) };
             let cells = area.cell_count() as f64 * (map.grid.geometry.resolution / lattice.resolution).powi(2);
+            if extent.sides().max() * lattice.resolution > lattice.max_extent {
+                return Err(LeftOut::TooLongAlone(lattice.max_extent));
+            }
             let joined = whole.map_or(extent, |whole| whole.joined(&extent));
             layout.geometry = Some(lattice.geometry(&joined, known + cells)?);
             (whole, known) = (Some(joined), known + cells);
@@ -87,6 +94,11 @@ fn extent(map: &PlacedGrid<'_>, area: &KnownArea, lattice: &CellLattice) -> Resu
 }
 
 impl Extent {
+    /// Lengths along x and y, cells.
+    fn sides(&self) -> Vector2<f64> {
+        self.high - self.low
+    }
+
     fn joined(&self, other: &Self) -> Self {
         Self { low: self.low.inf(&other.low), high: self.high.sup(&other.high) }
     }
@@ -104,7 +116,7 @@ impl CellLattice {
         if cells > most_cells_over(known) {
             return Err(LeftOut::Unknown);
         }
-        let corner = self.anchor + nalgebra::Vector2::new(left, bottom) * self.resolution;
+        let corner = self.anchor + Vector2::new(left, bottom) * self.resolution;
         let origin = pose(corner.x, corner.y, 0.0);
         Ok(GridGeometry { width, height, resolution: self.resolution, origin })
     }
@@ -168,6 +180,13 @@ mod tests {
     fn nothing_known_gives_no_grid() {
         assert_eq!(layout_at(grid(&[-1; 24]), &[Pose2::identity()]).geometry, None);
         assert_eq!(layout_of(&[], &LATTICE).geometry, None);
+    }
+
+    #[test]
+    fn a_map_that_is_too_long_by_itself_is_called_so() {
+        let long = GridGeometry { width: 6, height: 4, resolution: 50.0, origin: pose(-1.3, 2.7, 0.0) };
+        let layout = layout_at(Grid::new(long, &CELLS).unwrap(), &[Pose2::identity()]);
+        assert_eq!((layout.geometry, &layout.takes_part[..]), (None, &[Err(LeftOut::TooLongAlone(100.0))][..]));
     }
 
     #[test]

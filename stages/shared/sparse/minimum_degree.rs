@@ -8,8 +8,8 @@ const ELIMINATED: usize = usize::MAX;
 /// (approximate minimum degree; Amestoy, Davis and Duff 1996). `neighbours` are for each node those with a common
 /// equation.
 ///
-/// Where nodes have many neighbours, and not in the plane alone, as at places that many maps show, the factor is
-/// sparser than after a nested dissection.
+/// Where nodes have many neighbours, and not in the plane alone, as at places that many maps show or where a robot comes by
+/// again and again, the factor is sparser than after a dissection of the plane.
 pub(crate) fn minimum_degree(neighbours: Vec<Vec<usize>>) -> Vec<usize> {
     let count = neighbours.len();
     let mut elimination = Elimination::new(neighbours);
@@ -170,6 +170,46 @@ mod tests {
         assert!(minimum_degree(Vec::new()).is_empty());
     }
 
+    /// Number of blocks of the factor below the diagonal.
+    fn blocks_below(neighbours: &[Vec<usize>]) -> usize {
+        let places = minimum_degree(neighbours.to_vec());
+        let mut rows: Vec<Vec<usize>> = vec![Vec::new(); places.len()];
+        for (node, neighbours) in neighbours.iter().enumerate() {
+            rows[places[node]] = neighbours.iter().map(|&other| places[other]).collect();
+        }
+        let mut blocks = 0;
+        for column in 0..places.len() {
+            let mut below: Vec<usize> = rows[column].iter().copied().filter(|&row| row > column).collect();
+            below.sort_unstable();
+            below.dedup();
+            blocks += below.len();
+            if let Some(&parent) = below.first() {
+                rows[parent].extend(below);
+            }
+        }
+        blocks
+    }
+
+    #[test]
+    fn the_factor_of_a_drive_that_comes_by_few_places_again_and_again_grows_with_its_length_alone() {
+        let drive = |scans: usize| {
+            let mut neighbours: Vec<Vec<usize>> = vec![Vec::new(); 12 + scans];
+            let mut tie = |one: usize, other: usize| {
+                neighbours[one].push(other);
+                neighbours[other].push(one);
+            };
+            for scan in 12..12 + scans {
+                (0..4).for_each(|nearest| tie(scan, (scan + 3 * nearest) % 12));
+                if scan > 12 {
+                    tie(scan - 1, scan);
+                }
+            }
+            blocks_below(&neighbours)
+        };
+        let [short, long] = [400, 800].map(drive);
+        assert!(long < 800 * 16 && long as f64 <= 2.1 * short as f64, "{short} {long}");
+    }
+
     #[test]
     fn the_factor_of_a_strip_has_no_more_than_its_band() {
         // 40 x 3 nodes, each connected with those beside it; in the order of a band each column has 3 blocks below.
@@ -180,21 +220,7 @@ mod tests {
         };
         let neighbours: Vec<Vec<usize>> =
             (0..120).map(|one| (0..120).filter(|&other| is_near(one, other)).collect()).collect();
-        let places = minimum_degree(neighbours.clone());
-        let mut rows: Vec<Vec<usize>> = vec![Vec::new(); 120];
-        for (node, neighbours) in neighbours.iter().enumerate() {
-            rows[places[node]] = neighbours.iter().map(|&other| places[other]).collect();
-        }
-        let mut blocks = 0;
-        for column in 0..120 {
-            let mut below: Vec<usize> = rows[column].iter().copied().filter(|&row| row > column).collect();
-            below.sort_unstable();
-            below.dedup();
-            blocks += below.len();
-            if let Some(&parent) = below.first() {
-                rows[parent].extend(below);
-            }
-        }
+        let blocks = blocks_below(&neighbours);
         assert!(blocks <= 3 * 120, "{blocks}");
     }
 }

@@ -1,13 +1,12 @@
 //! Direct solution of sparse symmetric systems of blocks of 3 x 3: those of poses and of nodes of a deformation.
 //!
-//! [`nested_dissection`] or [`minimum_degree`] orders the unknowns, [`factor`] computes the Cholesky factor in that order, and
+//! [`minimum_degree`] orders the unknowns, [`factor`] computes the Cholesky factor in that order, and
 //! [`BlockCholesky`] solves with it and computes the parts of the inverse that are needed. [`SimilarSystems`] solves further
 //! systems with the factor of one. Arithmetic is done on dense parts, the fronts of an assembly tree.
 
 mod assembly_tree;
 mod block_cholesky;
 mod block_column;
-mod dissection;
 mod factoring;
 mod minimum_degree;
 mod selected_inverse;
@@ -16,7 +15,6 @@ mod similar_systems;
 mod tests;
 
 pub(crate) use block_cholesky::BlockCholesky;
-pub(crate) use dissection::nested_dissection;
 pub(crate) use factoring::factor;
 pub(crate) use minimum_degree::minimum_degree;
 pub(crate) use selected_inverse::SelectedInverse;

@@ -103,7 +103,7 @@ fn lattice(width: usize, height: usize) -> Columns {
         (0..at.len()).filter(move |&other| other != node && (at[node] - at[other]).norm() < 1.5)
     };
     let neighbours: Vec<Vec<usize>> = (0..at.len()).map(|node| near(node).collect()).collect();
-    let places = nested_dissection(&at, &neighbours);
+    let places = minimum_degree(neighbours.clone());
     let mut columns: Columns = vec![Vec::new(); at.len()];
     for (node, neighbours) in neighbours.iter().enumerate() {
         columns[places[node]].push((places[node], 9.0 * Matrix3::identity()));

@@ -59,7 +59,7 @@ pub struct LineExtractorParameters {
     pub max_points: usize,
     /// Largest distance of inliers from a line (D_line), metres; never less than three quarters of a cell, the width
     /// of a straight wall of single cells. Paper: 2 px.
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(range(max = 10.0), extend("exclusiveMinimum" = 0))]
     pub inlier_distance: f64,
     /// Least number of points of a wall under `points` scoring.
     #[schemars(range(min = 2))]

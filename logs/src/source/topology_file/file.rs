@@ -90,7 +90,7 @@ fn certain() -> f64 {
 /// is out of range.
 pub fn load(path: &Path) -> Result<TopologicalMap, TopologyFileError> {
     let unreadable = |error| TopologyFileError::Unreadable { path: path.to_owned(), error };
-    let text = input_file::read_text(path).map_err(unreadable)?;
+    let text = input_file::read_text(path, input_file::LONGEST_TEXT).map_err(unreadable)?;
     let map: JsonMap =
         serde_json::from_str(&text).map_err(|error| TopologyFileError::Malformed { path: path.to_owned(), error })?;
     let mut paths = Vec::with_capacity(map.paths.len());

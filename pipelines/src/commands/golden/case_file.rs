@@ -75,7 +75,8 @@ impl Case {
     pub(super) fn load(folder: &CaseFolder, registry: &Registry) -> Result<Self> {
         let path = folder.path.join("stage.toml");
         let name = path.display().to_string();
-        let text = input_file::read_text(&path).with_context(|| format!("cannot read {name}"))?;
+        let text =
+            input_file::read_text(&path, input_file::LONGEST_TEXT).with_context(|| format!("cannot read {name}"))?;
         let stage = SingleStage::parse(&name, &text, registry, &OWN_SECTIONS)?;
         if stage.kind.name != folder.kind {
             bail!(

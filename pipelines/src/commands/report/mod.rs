@@ -80,7 +80,8 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Status> {
 }
 
 fn read_summary(path: &Path) -> Result<Value> {
-    let text = input_file::read_text(path).with_context(|| format!("cannot read the summary {}", path.display()))?;
+    let text = input_file::read_text(path, input_file::LONGEST_TEXT)
+        .with_context(|| format!("cannot read the summary {}", path.display()))?;
     let summary: Value = serde_json::from_str(&text)
         .with_context(|| format!("{} is not a summary that `merge --summary` has written", path.display()))?;
     if !summary["stages"].is_object() {
