@@ -17,7 +17,8 @@ pub fn holds_tags_alone(inputs: &[Input], rules: &NameRules, robots: &RobotTopic
     Ok(holds_tags && !roles.contains(&Role::Map) && !roles.contains(&Role::Scan))
 }
 
-/// The robots with scans and without maps, by name; maps can be built from their scans. Only the channels are read.
+/// The robots with scans and without maps, by name, as far as they are read; maps can be built from their scans. Only the
+/// channels are read.
 ///
 /// # Errors
 /// A log cannot be read, or the rules do not match the logs.
@@ -28,15 +29,16 @@ pub fn robots_with_scans_only(
 ) -> Result<Vec<String>, NameError> {
     let (_, names) = names::open(inputs, rules, robots)?;
     let channels = RobotChannels::new(robots.clone(), names.channels());
-    Ok(channels.scanned().map(str::to_owned).collect())
+    let is_read = |robot: &&str| rules.robots.is_empty() || rules.robots.iter().any(|one| one == robot);
+    Ok(channels.scanned().filter(is_read).map(str::to_owned).collect())
 }
 
-/// The robots with maps, by name. Only the channels are read.
+/// The robots with maps that are read, by name. Only the channels are read.
 ///
 /// # Errors
 /// A log cannot be read, or the rules do not match the logs.
 pub fn robots_with_maps(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result<Vec<String>, NameError> {
     let (_, names) = names::open(inputs, rules, robots)?;
-    let channels = RobotChannels::new(robots.clone(), names.channels());
+    let channels = RobotChannels::new(robots.clone(), names.wanted_channels());
     Ok(channels.mapped().map(str::to_owned).collect())
 }
