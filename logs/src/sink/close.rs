@@ -48,7 +48,9 @@ pub fn close_log(path: &Path, reason: &str) -> Result<Option<PathBuf>, CloseErro
     };
     let closed = copy(file, output.part(), reason);
     match (closed, end) {
-        (Err(LogWriteError::NoRoom(_) | LogWriteError::TooLarge(_)), Some(end)) => close_in_place(output.part(), end, reason)?,
+        (Err(LogWriteError::NoRoom(_) | LogWriteError::TooLarge(_)), Some(end)) => {
+            close_in_place(output.part(), end, reason)?
+        }
         // As long as the file is locked, no other program removes it.
         (closed, _) => output.set_file(closed?),
     }

@@ -75,3 +75,15 @@ impl LogWriteError {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_of_the_size_is_no_full_disk() {
+        let text = |kind: ErrorKind| LogWriteError::from_io(Path::new("a.mcap"), kind.into()).to_string();
+        assert!(text(ErrorKind::FileTooLarge).contains("`ulimit -f`"));
+        assert!(text(ErrorKind::StorageFull).contains("free space"));
+    }
+}

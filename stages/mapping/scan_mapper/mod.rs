@@ -30,6 +30,7 @@ mod reasons;
 mod robot;
 mod scan_map;
 mod scan_odometry;
+mod scan_usage;
 mod slam_map;
 mod stage;
 #[cfg(test)]

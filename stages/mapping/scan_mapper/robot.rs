@@ -3,8 +3,9 @@
 use super::along_odometry::{ScanTimes, add_along_odometry};
 use super::continuous_odometry::ContinuousOdometry;
 use super::scan_odometry::ScanOdometry;
+use super::scan_usage::ScanUsage;
 use super::slam_map::{BadScans, LossCause, LostWay, SlamMap, TagSighting};
-use super::{ScanBeams, ScanError, ScanMap, ScanMapperParameters, TooLarge};
+use super::{ScanBeams, ScanMap, ScanMapperParameters, TooLarge};
 use crate::mapping::slam::Contradictions;
 use crate::shared::geometry::{Point2, Pose2, pose};
 use crate::shared::robot_clock::RobotClock;
@@ -58,11 +59,8 @@ pub(super) struct Robot {
     placed: ScanTimes,
     /// Tags that were seen, for which no pose is known so far.
     waiting_tags: VecDeque<(LogTime, TagSighting)>,
-    first_scan: Option<LogTime>,
-    /// Number of scans so far.
-    scans: usize,
-    /// Number of scans that cannot be used, and why the first cannot.
-    rejected: Option<(usize, ScanError)>,
+    /// The scans so far, and the times of the poses.
+    pub(super) usage: ScanUsage,
     /// Times of the first and the last scan in the map.
     pub(super) drawn: Option<[LogTime; 2]>,
     /// Time of the last scan in the map that was sent.
@@ -84,9 +82,7 @@ impl Robot {
             waiting: VecDeque::new(),
             placed: ScanTimes::default(),
             waiting_tags: VecDeque::new(),
-            first_scan: None,
-            scans: 0,
-            rejected: None,
+            usage: ScanUsage::default(),
             drawn: None,
             sent_until: None,
             is_loss_reported: false,
@@ -95,8 +91,7 @@ impl Robot {
 
     /// Adds a scan with its time.
     pub(super) fn add_scan(&mut self, time: LogTime, scan: ScanBeams) {
-        self.first_scan.get_or_insert(time);
-        self.scans += 1;
+        self.usage.add_scan(time);
         self.waiting.push_back((time, scan));
     }
 
@@ -138,6 +133,7 @@ impl Robot {
             }
             Localization::ByPoses(_) => {}
         }
+        self.usage.add_pose(time);
         self.poses.add(time, position(pose))
     }
 
@@ -148,6 +144,7 @@ impl Robot {
         if is_late || matches!(self.localization, Localization::ByScans(..)) {
             return None;
         }
+        self.usage.add_pose(time);
         let pose = self.continuous.follow(time, pose);
         self.odometry.add(time, position(&pose));
         if is_kept && !matches!(self.localization, Localization::ByPoses(_)) {
@@ -158,28 +155,18 @@ impl Robot {
 
     /// Seconds from the first scan to the first leap of odometry, if it has leapt.
     pub(super) fn odometry_leap(&self) -> Option<f64> {
-        Some(self.continuous.first_leap()?.seconds_since(self.first_scan?))
+        Some(self.continuous.first_leap()?.seconds_since(self.usage.first()?))
     }
 
     /// Number of its scans, if they are registered along odometry that has never moved.
     pub(super) fn scans_at_a_standstill(&self) -> Option<usize> {
         let is_by_odometry = matches!(self.localization, Localization::ByOdometry(_));
-        (is_by_odometry && self.continuous.stands_still()).then_some(self.scans)
+        (is_by_odometry && self.continuous.stands_still()).then_some(self.usage.count())
     }
 
-    /// Counts a scan that cannot be used.
-    pub(super) fn reject_scan(&mut self, problem: ScanError) {
-        self.rejected.get_or_insert((0, problem)).0 += 1;
-    }
-
-    /// Number of its scans, if none can be used, and why the first cannot.
-    pub(super) fn rejected_scans(&self) -> Option<(usize, ScanError)> {
-        self.rejected.filter(|_| self.scans == 0)
-    }
-
-    /// Number of its scans, if there are any and none is in a map.
-    pub(super) fn unused_scans(&self) -> Option<usize> {
-        (self.drawn.is_none() && self.scans > 0).then_some(self.scans)
+    /// Why none of its scans is in a map. `None` if it has sent none, or one is.
+    pub(super) fn why_none_is_used(&self) -> Option<String> {
+        self.usage.why_none().filter(|_| self.drawn.is_none())
     }
 
     /// Takes the odometry that was kept.
@@ -239,12 +226,12 @@ impl Robot {
     pub(super) fn take_lost_way(&mut self) -> Option<(f64, LossCause)> {
         let LostWay { time, cause } = self.slam_map()?.lost_way()?;
         let is_reported = std::mem::replace(&mut self.is_loss_reported, true);
-        Some((time.seconds_since(self.first_scan?), cause)).filter(|_| !is_reported)
+        Some((time.seconds_since(self.usage.first()?), cause)).filter(|_| !is_reported)
     }
 
     /// Starts to register scans, along odometry if there is any, once no poses came for long enough or none will come.
     pub(super) fn decide(&mut self, parameters: &ScanMapperParameters, is_end: bool) {
-        let (Localization::NotYet, Some(first)) = (&self.localization, self.first_scan) else { return };
+        let (Localization::NotYet, Some(first)) = (&self.localization, self.usage.first()) else { return };
         let has_waited = |latest: LogTime| is_end || latest.seconds_since(first) >= parameters.wait_for_poses;
         match (self.odometry.latest_time(), self.waiting.back()) {
             (Some(latest), _) if has_waited(latest) => {
@@ -310,8 +297,10 @@ impl Robot {
                 Localization::NotYet | Localization::ByScans(..) => ScanOutcome::NoPose,
                 Localization::ByPoses(map) => {
                     let drawn = draw_by_poses(map, &self.poses, time, &scan, parameters);
-                    if drawn == ScanOutcome::Used {
-                        self.drawn = Some([self.drawn.map_or(time, |[first, _]| first), time]);
+                    match drawn {
+                        ScanOutcome::Used => self.drawn = Some([self.drawn.map_or(time, |[first, _]| first), time]),
+                        ScanOutcome::TooLarge => self.usage.leave_out(),
+                        ScanOutcome::NoPose | ScanOutcome::NotMatched => {}
                     }
                     drawn
                 }

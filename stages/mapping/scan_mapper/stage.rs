@@ -139,7 +139,7 @@ impl ScanMapper {
         let scan = match scan {
             Ok(scan) => scan,
             Err(problem) => {
-                robot.reject_scan(problem);
+                robot.usage.reject_scan(problem);
                 output.warn(format!("scans of {} were left out: {problem}", message.robot()));
                 return Ok(());
             }
@@ -313,14 +313,8 @@ fn explain(
              odometry out: --rename '/{{robot}}/odom=/{{robot}}/unused'"
         ));
     }
-    if let Some(scans) = robot.unused_scans() {
-        let reason = format!(
-            "none of its {scans} scans is used: there is no pose of it for their times, or its map would get too large"
-        );
+    if let Some(reason) = robot.why_none_is_used() {
         return send_lost(name, &reason, output);
-    }
-    if let Some((scans, problem)) = robot.rejected_scans() {
-        return send_lost(name, &format!("none of its {scans} scans can be used: {problem}"), output);
     }
     if robot.drawn.is_some() && (robot.sees_nothing() || robot.map().is_none() && robot.bad_scans().is_none()) {
         let is_too_large = robot.is_by_slam() && !robot.sees_nothing();

@@ -174,7 +174,8 @@ fn a_robot_none_of_whose_scans_has_a_pose_is_reported() {
     (0..30).map(f64::from).for_each(|seconds| bench.scan(seconds, &still(seconds)));
     assert!(bench.map(500.0).0.is_none());
     let reasons = lost(&mut bench);
-    assert!(reasons.len() == 1 && reasons[0].contains("there is no pose of it for their times"), "{reasons:?}");
+    let reason = "none of its 30 scans is used: its first pose is 471.0 s after";
+    assert!(reasons.len() == 1 && reasons[0].contains(reason), "{reasons:?}");
 }
 
 #[test]
