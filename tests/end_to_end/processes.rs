@@ -249,7 +249,7 @@ fn the_result_is_that_of_one_thread_however_stages_stall_and_are_placed() {
 }
 
 #[test]
-fn a_full_disk_leaves_a_log_that_says_so() {
+fn a_log_that_can_grow_no_more_says_so() {
     // A small file system is more than a test may ask for; a limit of the size of files is not, where there is no other
     // file.
     let folder = folder();
@@ -257,9 +257,9 @@ fn a_full_disk_leaves_a_log_that_says_so() {
     let program = gridweave_program().to_str().unwrap();
     let args = ["-c", limited, program, "run", "diamond.toml", "-o", OUTPUT, "--engine", "threads"];
     let run = start_program("sh".as_ref(), folder.path(), &args, &[]);
-    run.wait().assert(1, &["stage `output` failed", "there is no room left"]);
+    run.wait().assert(1, &["stage `output` failed", "`ulimit -f`"]);
     // There is no room for an index, but for the reason.
     let info = start(folder.path(), &["info", OUTPUT], &[]).wait();
-    info.assert(0, &["ended early", "stage `output` failed", "there is no room left"]);
+    info.assert(0, &["ended early", "stage `output` failed", "`ulimit -f`"]);
     assert!(!part(&folder.path().join(OUTPUT)).exists());
 }

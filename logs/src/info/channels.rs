@@ -32,13 +32,3 @@ pub fn robots_with_scans_only(
     let is_read = |robot: &&str| rules.robots.is_empty() || rules.robots.iter().any(|one| one == robot);
     Ok(channels.scanned().filter(is_read).map(str::to_owned).collect())
 }
-
-/// The robots with maps that are read, by name. Only the channels are read.
-///
-/// # Errors
-/// A log cannot be read, or the rules do not match the logs.
-pub fn robots_with_maps(inputs: &[Input], rules: &NameRules, robots: &RobotTopics) -> Result<Vec<String>, NameError> {
-    let (_, names) = names::open(inputs, rules, robots)?;
-    let channels = RobotChannels::new(robots.clone(), names.wanted_channels());
-    Ok(channels.mapped().map(str::to_owned).collect())
-}

@@ -9,7 +9,7 @@ mod topics;
 #[cfg(test)]
 mod tests;
 
-pub use channels::{holds_tags_alone, robots_with_maps, robots_with_scans_only};
+pub use channels::{holds_tags_alone, robots_with_scans_only};
 pub use clocks::ClockInfo;
 pub use robots::RobotInfo;
 pub use run::RunInfo;

@@ -96,7 +96,7 @@ impl ResultSinks {
 }
 
 /// Whether a stage sends a merged map.
-pub(super) fn is_merged(pipeline: &Pipeline) -> bool {
+fn is_merged(pipeline: &Pipeline) -> bool {
     let mut outputs = pipeline.stages.iter().flat_map(|stage| &stage.kind.outputs);
     outputs.any(|output| output.topic == Some(MERGED))
 }
