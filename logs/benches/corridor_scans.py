@@ -9,12 +9,12 @@ is off by 5 % of the way (standard deviation of each step) and 3 % of the turn. 
 import argparse
 
 import numpy as np
-from robot_log import RobotLog
+from robot_log import DriftingOdometry, RobotLog
 
 HALF_WIDTH, START, END = 1.1, -5.0, 85.0
 DOOR_DEPTH, DOOR_WIDTH = 0.12, 0.9
 WAY, SPEED, RATE = 75.0, 0.6, 10.0
-NOISE, WAY_NOISE, TURN_NOISE = 0.01, 0.05, 0.03
+NOISE = 0.01
 
 
 def walls(has_doors, random):
@@ -54,20 +54,14 @@ def main():
     segments = walls(arguments.doors, random)
     step = 2 * np.pi / arguments.beams
     angles = -np.pi + step * np.arange(arguments.beams)
-    odometry = np.zeros(3)
-    before = None
+    odometry = DriftingOdometry(random)
     with open(arguments.output, "wb") as target:
         log = RobotLog(target, RATE, angles, arguments.range)
         for number in range(int(WAY / SPEED * RATE)):
             pose = np.array([number / RATE * SPEED, 0.15 * np.sin(0.05 * number), 0.08 * np.sin(0.05 * number + 1)])
-            if before is not None:
-                moved = pose - before
-                way = np.hypot(*moved[:2]) * (1 + WAY_NOISE * random.standard_normal())
-                heading = np.arctan2(moved[1], moved[0]) - before[2] + odometry[2]
-                odometry += [way * np.cos(heading), way * np.sin(heading), moved[2] * (1 + TURN_NOISE * random.standard_normal())]
-            before = pose
+            by_odometry = odometry.follow(pose)
             ranges = cast(segments, pose, angles + pose[2]) + NOISE * random.standard_normal(arguments.beams)
-            log.write(pose, odometry if arguments.odometry else None, ranges)
+            log.write(pose, by_odometry if arguments.odometry else None, ranges)
         log.finish()
 
 

@@ -13,8 +13,8 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from corridor_scans import NOISE, TURN_NOISE, WAY_NOISE, cast
-from robot_log import RobotLog
+from corridor_scans import NOISE, cast
+from robot_log import DriftingOdometry, RobotLog
 from trajectory_error import distances, poses, rms
 
 ROOM = [(0, 0, 10, 8), (4, 3, 5.5, 4), (8, 1, 9, 1.5)]
@@ -30,19 +30,14 @@ def walls():
 def write(path, scans):
     random = np.random.default_rng(1)
     segments, angles = walls(), -np.pi + 2 * np.pi / BEAMS * np.arange(BEAMS)
-    odometry, before = np.zeros(3), None
+    odometry = DriftingOdometry(random)
     with open(path, "wb") as target:
         log = RobotLog(target, RATE, angles, RANGE)
         for number in range(scans):
             turn = STEP * number
             pose = np.array([5 + 3.2 * np.cos(turn), 4 + 2.8 * np.sin(turn), turn + np.pi / 2])
-            if before is not None:
-                moved = pose - before
-                way = np.hypot(*moved[:2]) * (1 + WAY_NOISE * random.standard_normal())
-                heading = np.arctan2(moved[1], moved[0]) - before[2] + odometry[2]
-                odometry += [way * np.cos(heading), way * np.sin(heading), moved[2] * (1 + TURN_NOISE * random.standard_normal())]
-            before = pose
-            log.write(pose, odometry, cast(segments, pose, angles + pose[2]) + NOISE * random.standard_normal(BEAMS))
+            by_odometry = odometry.follow(pose)
+            log.write(pose, by_odometry, cast(segments, pose, angles + pose[2]) + NOISE * random.standard_normal(BEAMS))
         log.finish()
 
 

@@ -74,6 +74,27 @@ def pose_message(x, y, yaw):
     return {"position": {"x": x, "y": y, "z": 0.0}, "orientation": orientation}
 
 
+WAY_NOISE, TURN_NOISE = 0.05, 0.03
+
+
+class DriftingOdometry:
+    """Odometry that is off by 5 % of the way (standard deviation of each step) and 3 % of the turn."""
+
+    def __init__(self, random):
+        self.random, self.pose, self.before = random, np.zeros(3), None
+
+    def follow(self, pose):
+        """The pose by odometry of a robot that has moved on to `pose`, both as x, y and yaw."""
+        if self.before is not None:
+            moved = pose - self.before
+            way = np.hypot(*moved[:2]) * (1 + WAY_NOISE * self.random.standard_normal())
+            heading = np.arctan2(moved[1], moved[0]) - self.before[2] + self.pose[2]
+            turn = moved[2] * (1 + TURN_NOISE * self.random.standard_normal())
+            self.pose += [way * np.cos(heading), way * np.sin(heading), turn]
+        self.before = pose
+        return self.pose
+
+
 class RobotLog:
     """A log of `robot1` in which scans come at regular times, with beams at these angles up to a range in metres."""
 
