@@ -32,6 +32,8 @@ pub struct LogFile {
     is_map: bool,
     /// The shift of its log times, nanoseconds.
     later: i64,
+    /// Whether the index covers all messages.
+    is_indexed: bool,
     pub(crate) storage: Storage,
     pub(crate) layout: Layout,
 }
@@ -77,7 +79,10 @@ impl LogFile {
                 }
                 _ => ReadError::NothingLeft { path, damage: damage.clone() },
             }),
-            _ => Ok(Self { path, size, is_compressed, is_map, later: 0, storage, layout }),
+            _ => {
+                let is_indexed = whole_statistics(&layout).is_some_and(|known| is_complete(&layout.index, known));
+                Ok(Self { path, size, is_compressed, is_map, later: 0, is_indexed, storage, layout })
+            }
         }
     }
 
@@ -137,17 +142,12 @@ impl LogFile {
 
     /// The statistics record of an MCAP file; `None` if it has none or is damaged.
     pub fn statistics(&self) -> Option<&FileStatistics> {
-        let is_whole = self.layout.damage.iter().all(|damage| matches!(damage, Damage::Incomplete { .. }));
-        self.layout.statistics.as_ref().filter(|_| is_whole)
+        whole_statistics(&self.layout)
     }
 
     /// The index of an MCAP file by channel; `None` unless it covers all messages.
     pub(crate) fn index(&self) -> Option<&BTreeMap<u16, IndexedChannel>> {
-        let by_channel = &self.statistics()?.by_channel;
-        let counted = self.layout.index.iter().map(|(number, channel)| (*number, channel.messages));
-        let is_complete = |(number, count): (u16, u64)| by_channel.get(&number) == Some(&count);
-        let messages: u64 = self.layout.index.values().map(|channel| channel.messages).sum();
-        (counted.into_iter().all(is_complete) && self.statistics()?.messages == messages).then_some(&self.layout.index)
+        self.is_indexed.then_some(&self.layout.index)
     }
 
     /// Whether an index says that a channel has no messages, in a file that has some.
@@ -208,6 +208,20 @@ impl LogFile {
     pub fn first_time(&self) -> Option<u64> {
         self.layout.blocks.iter().map(|block| block.first_time).min()
     }
+}
+
+/// The statistics of a layout; `None` if there are none, or damage has lost messages.
+fn whole_statistics(layout: &Layout) -> Option<&FileStatistics> {
+    let is_whole = layout.damage.iter().all(|damage| matches!(damage, Damage::Incomplete { .. }));
+    layout.statistics.as_ref().filter(|_| is_whole)
+}
+
+/// Whether an index has as many messages as the statistics say, of each channel.
+fn is_complete(index: &BTreeMap<u16, IndexedChannel>, known: &FileStatistics) -> bool {
+    let is_counted =
+        |(number, channel): (&u16, &IndexedChannel)| known.by_channel.get(number) == Some(&channel.messages);
+    let messages: u64 = index.values().map(|channel| channel.messages).sum();
+    known.messages == messages && index.iter().all(is_counted)
 }
 
 fn head(bytes: &FileBytes) -> Vec<u8> {
