@@ -134,7 +134,7 @@ def _resolution_of(given: Any) -> float:
         resolution = float(resolution)
     except (TypeError, ValueError):
         resolution = math.nan
-    if not (math.isfinite(resolution) and resolution > 0):
+    if not _RESOLUTIONS[0] <= resolution <= _RESOLUTIONS[1]:
         raise _native.RequestError(f"the resolution of a map is a length in metres, and not {given!r}")
     return resolution
 
@@ -159,6 +159,9 @@ def _cells_of(given: Any) -> NDArray[np.int8]:
     if given.ndim != 2:
         hint = ": a picture in colours is converted to grey first" if given.ndim == 3 else ""
         raise _native.RequestError(f"a map is an array of rows and columns, and not of {given.ndim} dimensions{hint}")
+    if given.size > _MOST_CELLS:
+        size = f"{given.shape[1]} x {given.shape[0]}"
+        raise _native.RequestError(f"a map of {size} cells has more than the maximum of {_MOST_CELLS}: crop it to what is known")
     known = np.ones(given.shape, bool) if mask is None else ~mask
     if given.dtype.kind == "b":
         scaled = np.where(given, np.int8(100), np.int8(0))
@@ -194,6 +197,10 @@ def _cells_of(given: Any) -> NDArray[np.int8]:
     return cells
 
 
+# The most cells of a map, as many as an image of a map file may have.
+_MOST_CELLS = 1 << 28
+# Messages hold the resolution in single precision.
+_RESOLUTIONS = float(np.finfo(np.float32).tiny), float(np.finfo(np.float32).max)
 _OF_PICTURES = (
     ": `Map.load` reads an image file by its YAML file, and an array of 8 bits with white floor and black walls, row 0 on top, is a map as "
     "`(255 - picture[::-1]) / 255`, though without unknown cells"

@@ -185,6 +185,15 @@ class CellsTest(unittest.TestCase):
                 Map(given, 0.05)
         self.assertEqual(self.cells((255 - np.array([[0, 255], [255, 255]], np.uint8)[::-1]) / 255), [[0, 0], [100, 0]])
 
+    def test_more_cells_than_a_map_file_may_have_are_refused_before_they_are_copied(self):
+        with self.assertRaisesRegex(RequestError, "1000000 x 2000000 cells has more than the maximum"):
+            Map(np.broadcast_to(np.int8(0), (2_000_000, 1_000_000)), 0.05)
+
+    def test_a_resolution_that_a_message_cannot_hold_is_refused(self):
+        for resolution in (1e-300, 1e300, 0, -0.05, float("nan"), float("inf")):
+            with self.assertRaisesRegex(RequestError, "length in metres"):
+                Map([[0]], resolution)
+
     def test_what_holds_no_numbers_is_refused(self):
         for given, text in (([["a"]], "and not texts"), (np.array([[None]]), "and not objects"), ([[1j]], "complex"), (3, "0 dimensions")):
             with self.assertRaisesRegex(RequestError, text):
