@@ -108,7 +108,10 @@ fn execute(
     verbs: &[Verb],
     on_warning: fn(&str, &str),
 ) -> anyhow::Result<Status> {
-    let matches = command.clone().get_matches_from(words);
+    let matches = match command.clone().try_get_matches_from(words) {
+        Ok(matches) => matches,
+        Err(answer) => return print_answer(&answer),
+    };
     if let Some((name, of_verb)) = matches.subcommand()
         && let Some(verb) = verbs.iter().find(|verb| verb.name == name)
     {
@@ -116,4 +119,15 @@ fn execute(
         return Ok(Status::Done);
     }
     cli::Cli::from_arg_matches(&matches)?.execute(words, command, registry, on_warning)
+}
+
+/// Prints what the parser of the command line answers by itself: help, the version, or an error.
+fn print_answer(answer: &clap::Error) -> anyhow::Result<Status> {
+    let text = answer.render();
+    if answer.use_stderr() {
+        terminal::eprint_line(text.to_string().trim_end());
+        return Ok(Status::BadUse);
+    }
+    terminal::print(text)?;
+    Ok(Status::Done)
 }

@@ -49,10 +49,12 @@ fn no_command_panics_when_its_standard_error_is_closed() {
 }
 
 #[test]
-fn results_that_cannot_be_written_are_an_error() {
-    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
-    let child = Command::new(gridweave_program()).arg("kinds").stdout(full).stderr(Stdio::piped()).spawn().unwrap();
-    let ended = child.wait_with_output().unwrap();
-    assert_eq!(ended.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&ended.stderr).contains("cannot write to standard output"));
+fn results_and_help_that_cannot_be_written_are_an_error() {
+    for arg in ["kinds", "--help", "--version"] {
+        let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+        let child = Command::new(gridweave_program()).arg(arg).stdout(full).stderr(Stdio::piped()).spawn().unwrap();
+        let ended = child.wait_with_output().unwrap();
+        assert_eq!(ended.status.code(), Some(1), "{arg}");
+        assert!(String::from_utf8_lossy(&ended.stderr).contains("cannot write to standard output"), "{arg}");
+    }
 }

@@ -22,6 +22,8 @@ pub(super) struct Description {
     pub(super) assumed: Vec<String>,
 }
 
+/// The longest path that Linux opens, bytes.
+const LONGEST_PATH: usize = 4096;
 /// The farthest origin along an axis, metres: ten times farther than any coordinates of the earth's grids.
 const FARTHEST_ORIGIN: f64 = 1e8;
 /// The thresholds of a file without any: those of ROS map servers and savers.
@@ -79,6 +81,10 @@ impl Description {
         let Fields { image, resolution: Number(metres), origin, .. } = fields;
         if image.as_os_str().is_empty() {
             return Err(wrong("image", "is empty; it must be the image file".into()));
+        }
+        if image.as_os_str().len() > LONGEST_PATH || image.to_string_lossy().contains(char::is_control) {
+            let problem = format!("is no path of a file: it has control characters, or more than {LONGEST_PATH} bytes");
+            return Err(wrong("image", problem));
         }
         let resolution = metres as f32;
         if !(resolution.is_finite() && resolution > 0.0) {

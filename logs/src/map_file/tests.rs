@@ -196,6 +196,10 @@ fn invalid_values_are_reported_with_valid_ones() {
         assert!(without(field).contains(&format!("missing field `{field}`")), "{}", without(field));
     }
     let with = |from: &str, to: &str| error(&yaml("").replace(from, to));
+    for value in ["\"\"", r#""a\nb.pgm""#, r#""\e[31m.pgm""#, &"a".repeat(5000)] {
+        let text = with("map.pgm", value);
+        assert!(text.contains("`image` is") && text.len() < 200 && !text.contains(char::is_control), "{text}");
+    }
     for value in [".nan", "0", "-0.05", "1e-60", ".inf"] {
         assert!(with("0.05", value).contains("`resolution` is"), "{}", with("0.05", value));
     }

@@ -60,7 +60,10 @@ impl LogWriteError {
         let path = path.to_owned();
         match source.kind() {
             ErrorKind::IsADirectory => Self::IsFolder(path),
-            ErrorKind::NotFound | ErrorKind::NotADirectory => Self::NoFolder(folder_of(&path).to_owned()),
+            // In folders such as /proc nothing can be made, and the system calls that not found, too.
+            ErrorKind::NotFound | ErrorKind::NotADirectory if !folder_of(&path).is_dir() => {
+                Self::NoFolder(folder_of(&path).to_owned())
+            }
             ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => Self::Denied(path),
             ErrorKind::StorageFull | ErrorKind::QuotaExceeded => Self::NoRoom(path),
             ErrorKind::FileTooLarge => Self::TooLarge(path),
@@ -79,6 +82,13 @@ impl LogWriteError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_folder_that_is_there_is_not_missing() {
+        let text = |path: &str| LogWriteError::from_io(Path::new(path), ErrorKind::NotFound.into()).to_string();
+        assert!(text("/proc/out.mcap").contains("/proc/out.mcap: "), "{}", text("/proc/out.mcap"));
+        assert!(text("/no/folder/out.mcap").contains("there is no folder /no/folder"));
+    }
 
     #[test]
     fn a_limit_of_the_size_is_no_full_disk() {
