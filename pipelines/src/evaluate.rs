@@ -16,6 +16,7 @@ use crate::text_wrapping::wrap;
 use anyhow::{Context, Result, bail};
 use gridweave_logs::summary::{Frame, Summary};
 use gridweave_runtime::input_file;
+use gridweave_runtime::pipeline::list_in_words;
 use nalgebra::{Isometry2, Point2};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -139,8 +140,8 @@ fn measure(run: &Summary, truth: &TruthFile) -> Result<Evaluation> {
         Some(reference) if related => match truth.frames.get(reference) {
             Some(frame) => pose(frame).inverse(),
             None => {
-                let known: Vec<&str> = truth.frames.keys().map(String::as_str).collect();
-                bail!("the run's reference `{reference}` is not in the truth, which has {}", known.join(", "));
+                let known = list_in_words(truth.frames.keys());
+                bail!("the run's reference `{reference}` is not in the truth, which has {known}");
             }
         },
         _ => Isometry2::identity(),

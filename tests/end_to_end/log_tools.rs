@@ -173,7 +173,7 @@ fn a_log_that_names_its_robots_already_says_so_where_it_is_given_another_name() 
     let folder = TempDir::new().unwrap();
     simulate(folder.path(), "in.mcap", &SMALL_BUILDING);
     let args = ["merge", "fleet=in.mcap", "-o", "out.mcap"];
-    let words = ["in.mcap already contain robot names (robot1, robot2)", "omit `fleet=`"];
+    let words = ["in.mcap already contain robot names (robot1 and robot2)", "omit `fleet=`"];
     gridweave(folder.path(), &args).assert(1, &words);
     let args = ["info", "fleet=in.mcap", "--rename", "/robot1/map=/map"];
     gridweave(folder.path(), &args).assert(0, &["/fleet/map"]);

@@ -184,9 +184,11 @@ fn a_wrong_resolution_is_named_and_merged_only_with_the_right_one() {
     let evaluation = evaluate(folder.path(), &truth);
     assert_eq!((&evaluation["right"], &evaluation["wrong"]), (&Value::from(1), &Value::from(0)), "{evaluation}");
 
-    for (resolution, status, problem) in
-        [("robot3=0.05", 1, "the robots are robot1, robot2"), ("robot2=0", 2, "above 0"), ("robot2", 2, "ROBOT=METRES")]
-    {
+    for (resolution, status, problem) in [
+        ("robot3=0.05", 1, "the robots are robot1 and robot2"),
+        ("robot2=0", 2, "above 0"),
+        ("robot2", 2, "ROBOT=METRES"),
+    ] {
         merge(folder.path(), &[&args[..], &["--resolution", resolution]].concat()).assert(status, &[problem]);
     }
 }

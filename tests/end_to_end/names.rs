@@ -234,7 +234,7 @@ fn logs_that_look_alike_are_called_as_their_files_and_one_line_says_so() {
     world.write("blue.mcap", &[("robot2", &ALONE)]);
     let ended = world.merge(&["red.mcap", "blue.mcap"], ["red", "blue"]);
     assert_eq!(ended.text().matches("equal topics").count(), 1, "{ended:#?}");
-    ended.assert(0, &["red.mcap to red, blue.mcap to blue", "ROBOT=LOG"]);
+    ended.assert(0, &["red.mcap to red and blue.mcap to blue", "ROBOT=LOG"]);
     world.run(&["info", "red.mcap", "blue.mcap"]).assert(0, &["equal topics", "of blue", "/red/amcl_pose"]);
 }
 
@@ -276,7 +276,7 @@ fn topics_are_renamed_and_robots_and_times_chosen_on_the_command_line() {
     let one = LogFile::open(world.folder.path().join("one.mcap")).unwrap();
     assert!(one.channels().all(|(_, channel)| !channel.topic.starts_with("/robot2/")));
     let unknown = [&["merge"], &inputs[..], &["-o", "one.mcap", "--robots", "robot3"]].concat();
-    world.run(&unknown).assert(1, &["`robot3`", "robot1, robot2"]);
+    world.run(&unknown).assert(1, &["`robot3`", "robot1 and robot2"]);
     let part = [&["merge"], &inputs[..], &["-o", "part.mcap", "--start", "5", "--topics", "/{robot}/map"]].concat();
     world.run(&part);
     let part = LogFile::open(world.folder.path().join("part.mcap")).unwrap();

@@ -9,7 +9,7 @@ fn a_picture_is_written_in_the_format_of_its_name_and_is_the_same_every_time() {
     let folder = merged_folder();
     for (name, magic) in [("a.png", &b"\x89PNG"[..]), ("a.SVG", b"<svg"), ("a.pdf", b"%PDF")] {
         let args = ["render", "merged.mcap", "-o", name, "--show", "all", "--grid", "1"];
-        let says = "robot1, robot2 aligned, and <script>alert(1)<&'\" beside them";
+        let says = "robot1 and robot2 aligned, and <script>alert(1)<&'\" beside them";
         gridweave(folder.path(), &args).assert(0, &[says]);
         let first = fs::read(folder.path().join(name)).unwrap();
         assert!(first.starts_with(magic), "{name}");

@@ -34,7 +34,7 @@ fn robots_with_scans_and_poses_and_without_maps_are_merged() {
     logs_with(folder, "/{robot}/scan,/{robot}/pose,/{robot}/tag_ranges");
     gridweave(folder, &["info", "scans.mcap"])
         .assert(0, &["there is no map of robot1: `merge` builds one from its", "at the poses of /robot1/pose"]);
-    merge(folder).assert(0, &["no map of robot1, robot2: maps are built from scans", "merged 2 of 2"]);
+    merge(folder).assert(0, &["no map of robot1 and robot2: maps are built from scans", "merged 2 of 2"]);
     assert_eq!(judged(folder), [1, 0].map(Value::from));
     // The output has the maps that were built, and the scans that they were built from.
     let info = gridweave(folder, &["info", "out.mcap", "--json"]);
@@ -125,7 +125,7 @@ fn robots_with_scans_and_odometry_alone_are_merged() {
         with_odometry(&folder.join("in.mcap"), &folder.join("scans.mcap"), in_tf, true);
         let method = format!("by SLAM, with the odometry of {along}");
         gridweave(folder, &["info", "scans.mcap"]).assert(0, &[&method]);
-        merge(folder).assert(0, &["no map of robot1, robot2: maps are built from scans", "merged 2 of 2"]);
+        merge(folder).assert(0, &["no map of robot1 and robot2: maps are built from scans", "merged 2 of 2"]);
         assert_eq!(judged(folder), [1, 0].map(Value::from));
     }
     with_odometry(&folder.join("in.mcap"), &folder.join("scans.mcap"), false, false);
@@ -142,7 +142,7 @@ fn robots_with_scans_and_odometry_alone_are_merged() {
         lidar(wrong).assert(2, &["--lidar robot1=", "write ROBOT=X,Y,YAW"]);
     }
     gridweave(folder, &["merge", "scans.mcap", "-o", "out.mcap", "--lidar", "robot9=0,0,0"])
-        .assert(1, &["`lidars` names `robot9`", "robot1, robot2"]);
+        .assert(1, &["`lidars` names `robot9`", "robot1 and robot2"]);
     let degrees = ["merge", "scans.mcap", "-o", "out.mcap", "--set", "log.lidars={robot1 = [0, 0, 90]}"];
     gridweave(folder, &degrees).assert(2, &["must be [X, Y, YAW] or [X, Y, YAW, ROLL]", "90 degrees are 1.5708"]);
 }

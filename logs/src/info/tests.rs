@@ -154,8 +154,7 @@ fn the_option_that_renames_topics_of_maps_is_advised() {
     log.add("/fleet/a/map", OccupancyGrid::NAME, 1, &map_in("a/map"));
     log.add("/fleet/b/map", OccupancyGrid::NAME, 2, &map_in("b/map"));
     let problems = inspect_bytes(&log.finish()).problems;
-    let advice =
-        "maps on /fleet/a/map, /fleet/b/map do not fit `/{robot}/map`: give --rename '/fleet/{robot}/map=/{robot}/map'";
+    let advice = "maps on /fleet/a/map and /fleet/b/map do not fit `/{robot}/map`: give --rename '/fleet/{robot}/map=/{robot}/map'";
     assert_eq!(problems, [advice]);
 }
 

@@ -2,7 +2,7 @@
 
 use super::file_names::FileNameError;
 use crate::reader::ReadError;
-use gridweave_runtime::pipeline::suggest;
+use gridweave_runtime::pipeline::{list_in_words, suggest};
 use std::path::PathBuf;
 
 /// The error when logs cannot be opened or named.
@@ -27,10 +27,11 @@ pub enum NameError {
         /// The other one.
         other: String,
     },
-    /// Two logs of one time have maps of robots with one name, which would be taken for one robot.
+    /// Two logs of one time have maps or scans of robots with one name, which would be taken for one robot.
     #[error(
-        "both {one} and {other} have maps of `{robot}` at the same time: if these are two robots, name them: A={one} B={other}; if \
-         they are one, leave its maps out of one of the logs (`gridweave filter --topics`)",
+        "both {one} and {other} have maps or scans of `{robot}` at the same time: if these are two robots, name them: A={one} \
+         B={other}; if they are one, leave its maps out of one of the logs (`gridweave filter --topics`); if the logs do not belong \
+         together, merge them one at a time",
         one = .one.display(),
         other = .other.display()
     )]
@@ -73,6 +74,6 @@ fn nearest(topic: &str, renamed: &Option<String>, known: &[String]) -> String {
 fn listed(robots: &[String]) -> String {
     match robots.is_empty() {
         true => "no robot was recognised in them".to_owned(),
-        false => format!("the robots in them are {}", robots.join(", ")),
+        false => format!("the robots in them are {}", list_in_words(robots)),
     }
 }

@@ -8,6 +8,7 @@ use crate::robots::{RobotChannels, Role, is_scan};
 use crate::schemas::full_type_name;
 use crate::tf::tf_topic;
 use gridweave_runtime::message::Channel;
+use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::ros::{OccupancyGrid, Odometry, PoseStamped, PoseWithCovarianceStamped, RosMessage, TagRange};
 use gridweave_runtime::stage::RobotTopics;
 use std::collections::BTreeSet;
@@ -54,7 +55,7 @@ pub(super) fn infer_robots(
     let equal = (!equal.is_empty()).then(|| {
         format!(
             "the logs have equal topics without robot names, so each is assigned to a robot: {}; ROBOT=LOG sets other names",
-            equal.join(", ")
+            list_in_words(equal)
         )
     });
     let notes = equal.into_iter().chain(notes).chain(shown.notes().map(str::to_owned));

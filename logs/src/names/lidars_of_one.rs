@@ -10,6 +10,7 @@ use crate::robots::{BASES, RobotChannels, Role, is_lidar_topic, is_nameless_odom
 use crate::schemas::full_type_name;
 use crate::tf::tf_topic;
 use gridweave_runtime::message::Channel;
+use gridweave_runtime::pipeline::list_in_words;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A channel of an input: the index of its file, its number in it, and what it is.
@@ -74,7 +75,7 @@ impl<'a> Lidars<'a> {
 
     /// What shows that all are those of one robot; `None` if nothing does, or if their frames are on several bases.
     pub(super) fn of_one_robot(&self, frames: &FirstFrames) -> Option<OneRobot> {
-        let topics = self.scans.keys().copied().collect::<Vec<_>>().join(", ");
+        let topics = list_in_words(self.scans.keys());
         let namespaces: Vec<&str> = self.namespaces.iter().copied().collect();
         let one = |name: Option<String>, why: String| OneRobot {
             name,

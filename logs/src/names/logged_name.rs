@@ -4,6 +4,7 @@ use super::{Input, NameRules, TopicNaming};
 use crate::robots::{RobotChannels, Role};
 use crate::tf::tf_topic;
 use gridweave_runtime::message::Channel;
+use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::stage::RobotTopics;
 use std::collections::BTreeSet;
 
@@ -67,7 +68,7 @@ impl LoggedName {
             "the topics of {} already contain robot names ({}), and `{robot}` is put before them: omit `{robot}=`, or use \
              `--rename /{first}/map=/map` to make one of them {robot}'s",
             input.path.display(),
-            named.iter().map(String::as_str).collect::<Vec<_>>().join(", ")
+            list_in_words(named)
         ))
     }
 }

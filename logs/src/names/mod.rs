@@ -20,6 +20,7 @@ mod lidars_of_one;
 mod logged_name;
 mod map_frame_robot;
 mod naming;
+mod one_name_for_two;
 mod rename;
 mod rename_advice;
 mod rules;

@@ -5,6 +5,7 @@ use super::infer_robots::infer_robots;
 use super::lidars_of_one::NumberedChannel;
 use super::logged_name::LoggedName;
 use super::map_frame_robot::nameless_map;
+use super::one_name_for_two::check_robots;
 use super::rules::fits;
 use super::shown_robots::ShownRobots;
 use super::{Input, NameError, NameRules, Names, TopicNaming};
@@ -76,7 +77,8 @@ pub(super) fn name(
 
     let roles = RobotChannels::new(robots.clone(), drafts.iter().map(|draft| &draft.channel));
     if rules.convention == TopicNaming::ByRobot {
-        check_robots(&drafts, &roles, files, input_of, inputs)?;
+        let channels = drafts.iter().map(|draft| (draft.file, draft.number, &draft.channel));
+        check_robots(channels, &roles, files, input_of)?;
     }
     let mut known = known_robots(&roles, &drafts);
     known.extend(robots_with_unread_maps(drafts.iter().map(|draft| &draft.channel), &roles, &robots.map).into_keys());
@@ -207,45 +209,6 @@ fn check_renamed(drafts: &[Draft]) -> Result<(), NameError> {
         }
     }
     Ok(())
-}
-
-/// The maps of two robots would be taken for those of one if both have one name. The logs of one robot follow each
-/// other.
-fn check_robots(
-    drafts: &[Draft],
-    roles: &RobotChannels,
-    files: &[LogFile],
-    input_of: &[usize],
-    inputs: &[Input],
-) -> Result<(), NameError> {
-    let mut spans: BTreeMap<&str, Vec<(usize, u64, u64)>> = BTreeMap::new();
-    for draft in drafts {
-        let classified = roles.classify(&draft.channel);
-        let file = files.get(draft.file).filter(|_| classified.role == Role::Map);
-        let Some(((first, last), &input)) = file.and_then(|file| file.span(draft.number)).zip(input_of.get(draft.file))
-        else {
-            continue;
-        };
-        let of_robot = spans.entry(classified.robot).or_default();
-        let overlaps =
-            |(other, from, to): &&(usize, u64, u64)| *other != input && are_of_one_time([*from, *to], [first, last]);
-        if let Some((other, ..)) = of_robot.iter().find(overlaps)
-            && let [Some(one), Some(other)] = [inputs.get(*other), inputs.get(input)]
-        {
-            let [one, other] = [&one.path, &other.path].map(Clone::clone);
-            return Err(NameError::OneNameForTwo { robot: classified.robot.to_owned(), one, other });
-        }
-        of_robot.push((input, first, last));
-    }
-    Ok(())
-}
-
-/// Whether two spans of time have half of the shorter one or more in common. Parts of one recording may overlap a little where
-/// one ends and the next begins, as messages that came together are not written in the order of their times.
-fn are_of_one_time(one: [u64; 2], other: [u64; 2]) -> bool {
-    let [start, end] = [one[0].max(other[0]), one[1].min(other[1])];
-    let shorter = one[1].saturating_sub(one[0]).min(other[1].saturating_sub(other[0]));
-    end.checked_sub(start).is_some_and(|common| common >= shorter.div_ceil(2))
 }
 
 /// The topic for the transforms of all robots, if the channel carries transforms.

@@ -2,7 +2,8 @@ use super::*;
 use crate::test_log::{Folder, TestLog, layouts};
 use gridweave_runtime::message::LogTime;
 use gridweave_runtime::ros::{
-    Header, OccupancyGrid, PoseWithCovarianceStamped, RosMessage, TFMessage, TransformStamped, decode, encode,
+    Header, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, RosMessage, TFMessage, TransformStamped, decode,
+    encode,
 };
 
 mod shown_robots;
@@ -170,12 +171,38 @@ fn two_logs_of_one_time_do_not_give_one_robot_two_maps() {
         [("a.mcap", 0), ("b.mcap", 5), ("d.mcap", 9), ("c.mcap", 11)].map(|(name, from)| write(name, from));
     let opened = |paths: &[PathBuf]| open(&inputs(paths), &NameRules::default(), &RobotTopics::default()).map(|_| ());
     let error = opened(&[first.clone(), same_time.clone()]).unwrap_err().to_string();
-    assert!(error.contains("have maps of `robot1` at the same time") && error.contains("A="), "{error}");
+    assert!(error.contains("maps or scans of `robot1` at the same time") && error.contains("A="), "{error}");
     opened(&[first.clone(), later]).unwrap();
     opened(&[first.clone(), next_part]).unwrap();
     let named =
         [("a", &first), ("b", &same_time)].map(|(robot, path)| Input { robot: Some(robot.into()), path: path.clone() });
     assert_eq!(topics(&named, &NameRules::default()), [["/a/map"], ["/b/map"]]);
+}
+
+/// Opens a folder of logs that have a map of a robot at one time and its poses from a time to another, each with its name.
+fn open_folder(logs: &[(&str, u64, [u64; 2])]) -> Result<(), String> {
+    let folder = Folder::new();
+    for (name, map, poses) in logs {
+        let mut log = TestLog::new(layouts()[1].clone());
+        log.add("/robot1/map", OccupancyGrid::NAME, *map, &OccupancyGrid::default());
+        for time in poses {
+            log.add("/robot1/pose", PoseStamped::NAME, *time, &PoseStamped::default());
+        }
+        folder.write(name, &log.finish());
+    }
+    let input = folder.path();
+    open(&inputs(&[input]), &NameRules::default(), &RobotTopics::default())
+        .map(|_| ())
+        .map_err(|error| error.to_string())
+}
+
+#[test]
+fn two_logs_are_of_one_time_by_all_that_they_have_of_a_robot_in_a_folder_as_well() {
+    let error = open_folder(&[("lab.mcap", 2, [0, 20]), ("hall.mcap", 30, [0, 40])]).unwrap_err();
+    assert!(error.contains("lab.mcap") && error.contains("hall.mcap"), "{error}");
+    let error = open_folder(&[("run1.mcap", 2, [0, 20]), ("run2.mcap", 12, [0, 22])]).unwrap_err();
+    assert!(error.contains("at the same time"), "{error}");
+    open_folder(&[("run_0.mcap", 2, [0, 20]), ("run_1.mcap", 20, [19, 40]), ("run_2.mcap", 40, [39, 40])]).unwrap();
 }
 
 #[test]
@@ -202,7 +229,7 @@ fn robots_and_topics_that_are_not_selected_are_dropped() {
     assert_eq!(read(NameRules { topics, ..Default::default() }), ["/r1/map", "/r2/map", "/y"]);
     let rules = NameRules { robots: vec!["r3".into()], ..Default::default() };
     let error = open(&inputs(&[path]), &rules, &RobotTopics::default()).err().unwrap().to_string();
-    assert!(error.contains("`r3`") && error.contains("r1, r2"), "{error}");
+    assert!(error.contains("`r3`") && error.contains("r1 and r2"), "{error}");
 }
 
 /// The frames of a message on a topic of a log, after renaming.

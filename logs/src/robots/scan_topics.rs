@@ -5,6 +5,7 @@ use super::part_names::is_sensor;
 use super::scans::is_scan;
 use crate::schemas::full_type_name;
 use gridweave_runtime::message::Channel;
+use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::ros::{PointCloud2, RosMessage};
 use gridweave_runtime::stage::match_robot;
 use std::collections::{BTreeMap, BTreeSet};
@@ -94,7 +95,7 @@ impl ScanTopics {
         let unread = self.unread.get(robot).filter(|_| is_chosen)?;
         Some(format!(
             "of the lidars of {robot}, the one on `{topic}` is read, and not those on {}: `--rename {}={}` reads another",
-            unread.join(", "),
+            list_in_words(unread),
             unread.first()?,
             self.pattern.replace("{robot}", robot)
         ))

@@ -7,6 +7,7 @@ use crate::names::{self, TopicNaming};
 use crate::reader::{LogFile, LogReader};
 use crate::robots::CellValues;
 use gridweave_runtime::message::LogTime;
+use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::stage::{Context, Output, Source, StageError};
 
 /// The number of messages that are read at a time.
@@ -58,7 +59,7 @@ impl McapSource {
             let scanned: Vec<&str> = router.scanned().collect();
             let help = match scanned.is_empty() {
                 true => "no map is built from scans in these logs".to_owned(),
-                false => format!("maps are built from the scans of {}", scanned.join(", ")),
+                false => format!("maps are built from the scans of {}", list_in_words(scanned)),
             };
             let error = format!("`lidars` names `{robot}`, of whose scans no map is built");
             return Err(StageError::new(doing, error).with_help(help));
@@ -67,7 +68,7 @@ impl McapSource {
             let mapped: Vec<&str> = router.mapped().collect();
             let help = match mapped.is_empty() {
                 true => "no robot has a map in these logs".to_owned(),
-                false => format!("there are maps of {}", mapped.join(", ")),
+                false => format!("there are maps of {}", list_in_words(mapped)),
             };
             let error = format!("`resolutions` names `{robot}`, which has no map");
             return Err(StageError::new(doing, error).with_help(help));

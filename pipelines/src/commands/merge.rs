@@ -9,6 +9,7 @@ use anyhow::Result;
 use clap::Args;
 use gridweave_logs::info;
 use gridweave_logs::names::{Input, TopicNaming};
+use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::stage::{Registry, RobotTopics};
 use std::path::{Path, PathBuf};
 
@@ -49,7 +50,7 @@ impl MergeArgs {
             Inputs::Logs => match &robots_without_maps(self)?[..] {
                 [] => "auto_merge",
                 robots => {
-                    let robots = robots.join(", ");
+                    let robots = list_in_words(robots);
                     eprint_line(format_args!("the log has no map of {robots}: maps are built from scans (scan_merge)"));
                     "scan_merge"
                 }

@@ -122,7 +122,7 @@ fn robots_that_are_in_only_one_of_the_files_are_listed() {
 fn a_reference_that_is_not_in_the_truth_is_an_error() {
     let summary = json!({"reference": "robot9", "frames": {"robot9": frame(0.0, 0.0, 0.0)}});
     let error = format!("{:#}", run(&summary, &truth()).unwrap_err());
-    assert!(error.contains("`robot9` is not in the truth, which has robot1, robot2, robot3"), "{error}");
+    assert!(error.contains("`robot9` is not in the truth, which has robot1, robot2 and robot3"), "{error}");
 }
 
 #[test]

@@ -8,6 +8,7 @@ use super::solution::{Alignments, Solution, by_name};
 use super::solve::solve;
 use super::tree::Tree;
 use crate::shared::robot_pair::RobotPair;
+use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::ros::{
     Alignment, Header, OccupancyGrid, RobotFrames, TFMessage, TagEstimates, UnmergedRobot, Verdict, Verdicts,
 };
@@ -205,19 +206,17 @@ impl FrameSolver {
         if let Some(wanted) = &self.wanted
             && !self.robots.contains(wanted)
         {
-            let robots: Vec<String> = self.robots.iter().cloned().collect();
-            let cause = match robots.is_empty() {
+            let cause = match self.robots.is_empty() {
                 true => "neither it nor any other robot sent a map".to_owned(),
-                false => format!("it sent no map; the robots seen are {}", robots.join(", ")),
+                false => format!("it sent no map; the robots seen are {}", list_in_words(&self.robots)),
             };
             return Err(StageError::new(format!("place the maps in the frame of the reference `{wanted}`"), cause)
                 .with_help("set `reference` in [pipeline] to one of the robots, or check the topics in [robots]"));
         }
         for robot in self.initial_poses.keys().filter(|robot| !self.robots.contains(*robot)) {
-            let robots: Vec<&str> = self.robots.iter().map(String::as_str).collect();
             output.warn(format!(
                 "the initial pose of `{robot}` is not used, as there is no such robot; the robots seen are {}",
-                robots.join(", ")
+                list_in_words(&self.robots)
             ));
         }
         if self.maps.input_ended() {

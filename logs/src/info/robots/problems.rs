@@ -5,8 +5,9 @@ use crate::info::{LogInfo, TopicInfo};
 use crate::names::{rename_advice, scan_rename_advice};
 use crate::robots::{is_scan, problem_of_frames};
 use crate::schemas::full_type_name;
+use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::ros::{Odometry, RosMessage};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 impl RobotSurvey {
     /// Problems with reading the logs or merging the maps, in the order in which they should be fixed.
@@ -71,11 +72,11 @@ impl RobotSurvey {
     /// Maps that belong to no robot, or the lack of any. `advice` is the arguments that rename their topics.
     fn map_topic_problem(&self, advice: &[String]) -> Option<String> {
         let pattern = &self.topics.map;
-        let topics = joined(&self.other_maps);
+        let topics = list_in_words(&self.other_maps);
         match (advice, topics.as_str()) {
             ([], _) if self.one_map.is_some() => None,
             ([], "") if self.has_no_map() => {
-                let scans = match joined(&self.other_scans) {
+                let scans = match list_in_words(&self.other_scans) {
                     scans if self.other_scans.is_empty() => scans,
                     scans => format!(
                         "; `merge` builds maps from the scans on {scans} if the robot is named (`gridweave merge \
@@ -128,7 +129,7 @@ impl RobotSurvey {
         };
         let lacking = |what: &str, lacks: &dyn Fn(&str, &RobotInfo) -> bool| {
             let names = self.robots.iter().filter(|(name, robot)| lacks(name, robot)).map(|(name, _)| name.as_str());
-            let names = names.collect::<Vec<_>>().join(", ");
+            let names = list_in_words(names);
             (!names.is_empty()).then(|| format!("there is no {what} of {names}"))
         };
         let maps = lacking("map", &|name, robot| robot.maps + robot.scans == 0 && !is_explained(name));
@@ -181,8 +182,4 @@ fn mixed_frames(info: &LogInfo) -> impl Iterator<Item = String> {
     };
     let problem = |topic: &TopicInfo| problem_of_frames(&topic.topic, topic.frames.iter());
     info.topics.iter().filter(is_of_one).filter_map(problem)
-}
-
-fn joined(topics: &BTreeSet<String>) -> String {
-    topics.iter().map(String::as_str).collect::<Vec<_>>().join(", ")
 }

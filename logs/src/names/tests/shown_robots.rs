@@ -57,7 +57,7 @@ fn lidars_on_one_base_are_those_of_one_robot() {
     let two = [("/sick1/scan", "laser1", "base_link"), ("/sick2/scan", "laser2", "base_link")];
     let (topics, note) = named(&[("log.mcap", lidars(&two, &["/odom"]))], &[]);
     assert_eq!(topics, [["/tf_static", "/log/scan", "/log/sick2/scan", "/log/odom"]], "one of them is read");
-    assert!(note.starts_with("the scans on /sick1/scan, /sick2/scan are those of one robot, as tf has"), "{note}");
+    assert!(note.starts_with("the scans on /sick1/scan and /sick2/scan are those of one robot, as tf has"), "{note}");
     assert!(
         note.contains("`base_link`") && note.contains("--robots sick1,sick2 takes each lidar for a robot"),
         "{note}"

@@ -5,6 +5,7 @@ use crate::names::{rename_advice, scan_rename_advice};
 use crate::robots::{Role, is_scan, unread_map};
 use crate::schemas::full_type_name;
 use crate::source::RobotMessages;
+use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::ros::{OccupancyGrid, RosMessage};
 use gridweave_runtime::stage::Output;
 
@@ -26,7 +27,7 @@ impl ChannelRouter {
         };
         let builds_maps = output.scans.is_read() && routed(|role| role == Role::Scan);
         if output.map.is_read() && !builds_maps && !self.has_one_map && !routed(|role| role == Role::Map) {
-            let others = match self.grid_topics().collect::<Vec<_>>().join(", ") {
+            let others = match list_in_words(self.grid_topics()) {
                 topics if topics.is_empty() => topics,
                 topics => format!(" (there are maps on {topics})"),
             };

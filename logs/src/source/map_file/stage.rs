@@ -7,6 +7,7 @@ use crate::qos;
 use crate::robots::unit_of_map;
 use crate::schemas::schema_text;
 use gridweave_runtime::message::{Channel, FixedText, LogTime, MessageHeader, TextTooLong};
+use gridweave_runtime::pipeline::list_in_words;
 use gridweave_runtime::ros::{Header, OccupancyGrid, RosMessage, encode};
 use gridweave_runtime::stage::{Context, Output, Source, StageError};
 use std::path::PathBuf;
@@ -50,7 +51,7 @@ impl MapFileSource {
         let thresholds = if parameters.literal_thresholds { Thresholds::Literal } else { Thresholds::ByPicture };
         let names: Vec<&str> = files.iter().map(|(robot, _)| robot.as_str()).collect();
         if let Some(robot) = parameters.resolutions.keys().find(|robot| !names.contains(&robot.as_str())) {
-            let help = format!("the robots are {}", names.join(", "));
+            let help = format!("the robots are {}", list_in_words(names));
             let error = format!("`resolutions` names `{robot}`, which has no map");
             return Err(StageError::new(doing, error).with_help(help));
         }

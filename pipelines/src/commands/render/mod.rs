@@ -10,7 +10,7 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 use gridweave_logs::map_file::GridMap;
 use gridweave_logs::picture::{Cells, MapLayer, Marks, Picture, PictureError, Scene, check_format, robot_colour};
-use gridweave_runtime::pipeline::suggest;
+use gridweave_runtime::pipeline::{list_in_words, suggest};
 use nalgebra::Isometry2;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -172,7 +172,7 @@ fn contents(placing: &Placing, is_merged_map: bool) -> String {
         return "the merged map".to_owned();
     }
     let (merged, others): (Vec<_>, Vec<_>) = placing.robots.iter().partition(|robot| robot.is_merged);
-    let names = |robots: &[&PlacedRobot]| robots.iter().map(|robot| robot.name.as_str()).collect::<Vec<_>>().join(", ");
+    let names = |robots: &[&PlacedRobot]| list_in_words(robots.iter().map(|robot| &robot.name));
     match (merged.is_empty(), others.is_empty()) {
         (true, _) => format!("{} beside each other", names(&others)),
         (_, true) => format!("{} aligned", names(&merged)),

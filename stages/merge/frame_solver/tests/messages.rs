@@ -35,7 +35,7 @@ fn a_reference_that_never_shows_up_is_an_error_that_names_the_robots() {
     run.map("robot1", "map");
     run.map("robot2", "map");
     let error = run.finish().unwrap_err().to_string();
-    assert!(error.contains("robot7") && error.contains("robot1, robot2"), "{error}");
+    assert!(error.contains("robot7") && error.contains("robot1 and robot2"), "{error}");
     assert_eq!(run.latest(), None);
 }
 
@@ -74,7 +74,7 @@ fn an_initial_pose_of_a_robot_that_never_shows_up_is_a_warning() {
     run.finish().unwrap();
     let warnings: Vec<String> = run.stage.warnings().into_keys().collect();
     let warning =
-        "the initial pose of `robt2` is not used, as there is no such robot; the robots seen are robot1, robot2";
+        "the initial pose of `robt2` is not used, as there is no such robot; the robots seen are robot1 and robot2";
     assert_eq!(warnings, [warning]);
 }
 
