@@ -1,7 +1,9 @@
 //! Outputs: a run owns the files that it writes, touches no others, and what was there stays until there is something
 //! better.
 
-use crate::support::{DIAMOND, Run, Running, TROUBLED, gridweave, outcome, part, processes, signal, start, wait_until};
+use crate::support::{
+    DIAMOND, Run, Running, TROUBLED, gridweave, outcome, part, processes, signal, simulate, start, wait_until,
+};
 use std::fs;
 use std::os::unix::fs::{FileTypeExt, symlink};
 use std::path::Path;
@@ -77,6 +79,35 @@ fn a_run_that_fails_leaves_the_earlier_output_in_its_place() {
     }
     run(folder.path(), "threads").wait().assert(0, &[]);
     assert!(fs::read(&output).unwrap() == earlier && !part(&output).exists());
+}
+
+#[test]
+fn a_run_without_any_map_leaves_the_earlier_outputs_in_their_place() {
+    let folder = TempDir::new().unwrap();
+    simulate(folder.path(), "in.mcap", &["--robots", "1", "--set", "duration=10"]);
+    let no_map = ["filter", "in.mcap", "-o", "no_map.mcap", "--topics", "/tf"];
+    gridweave(folder.path(), &no_map).assert(0, &[]);
+    for output in [OUTPUT, "summary.json"] {
+        fs::write(folder.path().join(output), "earlier").unwrap();
+    }
+    let merge = ["merge", "no_map.mcap", "-o", OUTPUT, "--summary", "summary.json"];
+    gridweave(folder.path(), &merge).assert(1, &["the input has no usable map"]);
+    for output in [OUTPUT, "summary.json"] {
+        assert_eq!(fs::read(folder.path().join(output)).unwrap(), b"earlier", "{output}");
+    }
+}
+
+#[test]
+fn a_run_whose_folder_is_removed_ends_and_says_so() {
+    let folder = folder();
+    let runs = TempDir::new().unwrap();
+    let variables = [("XDG_RUNTIME_DIR", runs.path().to_str().unwrap())];
+    let args = ["run", "diamond.toml", "-o", OUTPUT, "--engine", "processes"];
+    let running = start(folder.path(), &args, &variables);
+    let output = folder.path().join(OUTPUT);
+    wait_until("messages", || fs::metadata(part(&output)).is_ok_and(|file| file.len() > 20_000));
+    fs::remove_dir_all(runs.path().join("gridweave")).unwrap();
+    running.wait().assert(1, &["has lost its folder", "XDG_RUNTIME_DIR"]);
 }
 
 #[test]

@@ -2,9 +2,10 @@
 
 use crate::support::{Ended, LogBuilder, evaluate, gridweave, simulate};
 use gridweave_runtime::ros::{
-    Header, LaserScan, Odometry, PoseStamped, RosMessage, TFMessage, TransformStamped, decode,
+    Header, LaserScan, Odometry, PoseStamped, PoseWithCovarianceStamped, RosMessage, TFMessage, TransformStamped,
+    decode,
 };
-use nalgebra::Isometry2;
+use nalgebra::{Isometry2, Vector2};
 use serde_json::Value;
 use std::path::Path;
 use tempfile::TempDir;
@@ -171,6 +172,73 @@ fn robots_whose_odometry_drifts_are_merged() {
     merge(folder).assert(0, &["no map of robot2: maps are built from scans", "merged 2 of 2"]);
     assert_eq!(judged(folder), [1, 0].map(Value::from));
     assert_eq!(refined_together(folder), 1);
+}
+
+/// Seconds of the drive of `with_gap` from the start of its first part to that of its second.
+const SECOND_PART: f64 = 1000.0;
+
+/// Writes the scans and the odometry of two robots as those of one, robot1, which was not recorded between them.
+fn with_gap(log: &Path, to: &Path) {
+    let bytes = std::fs::read(log).unwrap();
+    let mut written = LogBuilder::new(to);
+    let mut start = None;
+    let as_robot1 = |text: &str| text.replace("robot2", "robot1");
+    for message in mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap) {
+        let topic = &message.channel.topic;
+        let later = if topic.starts_with("/robot2/") { SECOND_PART } else { 0.0 };
+        let seconds = (message.log_time - *start.get_or_insert(message.log_time)) as f64 * 1e-9 + later;
+        let renamed = |header: &Header| gridweave_tests::header(seconds, as_robot1(&header.frame_id));
+        match message.channel.schema.as_ref().unwrap().name.as_str() {
+            Odometry::NAME => {
+                let mut odometry: Odometry = decode(&message.data).unwrap();
+                odometry.header = renamed(&odometry.header);
+                odometry.child_frame_id = as_robot1(&odometry.child_frame_id);
+                written.message(seconds, "/robot1/odom", &odometry);
+            }
+            LaserScan::NAME => {
+                let mut scan: LaserScan = decode(&message.data).unwrap();
+                scan.header = renamed(&scan.header);
+                written.message(seconds, "/robot1/scan", &scan);
+            }
+            _ => {}
+        }
+    }
+    written.finish();
+}
+
+/// The first and the last pose on a topic.
+fn ends(log: &Path, topic: &str, pose: impl Fn(&[u8]) -> Isometry2<f64>) -> [Isometry2<f64>; 2] {
+    let bytes = std::fs::read(log).unwrap();
+    let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+    let mut poses = messages.filter(|message| message.channel.topic == topic).map(|message| pose(&message.data));
+    let first = poses.next().unwrap();
+    [first, poses.last().unwrap()]
+}
+
+#[test]
+fn a_drive_that_was_not_recorded_for_long_goes_on_where_both_parts_fit() {
+    let folder = TempDir::new().unwrap();
+    let folder = folder.path();
+    let world = ["--robots", "2", "--seed", "5", "--set", "overlap=0.9", "--set", "scans=true", "--set", "drift=0"];
+    let small = ["--set", "width=12", "--set", "height=10", "--set", "tags=0", "--set", "odometry=true"];
+    simulate(folder, "in.mcap", &[&world[..], &small].concat());
+    with_gap(&folder.join("in.mcap"), &folder.join("scans.mcap"));
+    let ended = merge(folder);
+    ended.assert(0, &["only robot1 has a map"]);
+    assert!(!ended.text().contains("lost its way"), "{}", ended.text());
+    let truth: Value = serde_json::from_slice(&std::fs::read(folder.join("in.truth.json")).unwrap()).unwrap();
+    let [first, last] = ["robot1", "robot2"].map(|robot| {
+        let frame = ["x", "y", "yaw"].map(|key| truth["frames"][robot][key].as_f64().unwrap());
+        let poses = ends(&folder.join("in.mcap"), &format!("/{robot}/pose"), |data| {
+            decode::<PoseStamped>(data).unwrap().pose.planar()
+        });
+        poses.map(|pose| Isometry2::new(Vector2::new(frame[0], frame[1]), frame[2]) * pose)
+    });
+    let found = ends(&folder.join("out.mcap"), "/robot1/matched_pose", |data| {
+        decode::<PoseWithCovarianceStamped>(data).unwrap().pose.pose.planar()
+    });
+    let off = first[0].inv_mul(&last[1]).inv_mul(&found[0].inv_mul(&found[1]));
+    assert!(off.translation.vector.norm() < 0.2 && off.rotation.angle().abs() < 0.05, "{off}");
 }
 
 /// How many robots with scans were refined in one pose graph.

@@ -139,6 +139,9 @@ impl Job<'_> {
         let written = report.map_err(anyhow::Error::from).and_then(|report| {
             let mut summary = RunSummary::new(sinks.summary()?, &report);
             add_unused_robots(self, &pipeline, &mut summary);
+            if pipeline.mode == Mode::Replay {
+                summary.check_for_maps()?;
+            }
             let text = summary.to_json() + "\n";
             outputs.place(self.options.summary.as_deref().map(|path| (path, text.as_str())))?;
             Ok((report, summary))
@@ -150,9 +153,6 @@ impl Job<'_> {
             bag.describe()?;
         }
         let (report, summary) = written?;
-        if pipeline.mode == Mode::Replay {
-            summary.check_for_maps()?;
-        }
         sinks.check_written(&summary, &report)?;
         Ok(summary)
     }

@@ -88,6 +88,11 @@ pub enum Failure {
     /// A process or thread could not be started, or the folder of the run could not be used.
     #[error("could not be started: {0}")]
     Process(String),
+    /// The folder of the run was removed, by which its processes find each other.
+    #[error(
+        "has lost its folder {0}, which another program has removed: run it again, with XDG_RUNTIME_DIR set to a folder that stays"
+    )]
+    NoFolder(String),
     /// The request of a program outside of the run is impossible.
     #[error("{0}")]
     Outside(String),

@@ -9,12 +9,15 @@ use super::overrides::Overrides;
 use super::settings::Settings;
 use super::stage_section::{Draft, read_stage};
 use super::values::entries;
-use super::wiring::{Wiring, check_topics_differ, check_used};
+use super::wiring::{Wiring, check_readers, check_topics_differ, check_used};
 use super::{Pipeline, StageSpec, Wire};
 use crate::input_file;
 use crate::stage::Registry;
 use std::collections::BTreeSet;
 use std::path::Path;
+
+/// The maximum size of a pipeline file, bytes: errors in longer ones, with names and lines of any length, would take long to describe.
+const LONGEST_PIPELINE: u64 = 1 << 20;
 
 impl Pipeline {
     /// Reads and checks a pipeline file.
@@ -24,7 +27,7 @@ impl Pipeline {
     /// The file cannot be read, or it has errors, all of which are returned.
     pub fn load(path: &Path, registry: &Registry, overrides: &Overrides) -> Result<Self, PipelineErrors> {
         let name = path.display().to_string();
-        match input_file::read_text(path, input_file::LONGEST_TEXT) {
+        match input_file::read_text(path, LONGEST_PIPELINE) {
             Ok(text) => Self::parse(&name, &text, registry, overrides),
             Err(error) => Err(PipelineErrors::of_whole(&name, format!("cannot read the pipeline `{name}`: {error}"))),
         }
@@ -56,6 +59,7 @@ impl Pipeline {
             stages.iter().map(|stage| read_stage(stage, &settings, folder, registry, &mut problems)).collect();
         let wiring = Wiring::new(&drafts, registry, &mut problems);
         check_used(&drafts, &wiring, &mut problems);
+        check_readers(&drafts, &wiring, &mut problems);
         check_topics_differ(&drafts, &wiring, &mut problems);
         let order = check_order(&drafts, &wiring.mentions, &mut problems);
 

@@ -122,8 +122,8 @@ fn check_name(what: &str, name: &str, at: &Location, problems: &mut Problems) {
     if name.len() > LONGEST_NAME {
         let label = format!("expected at most {LONGEST_NAME} characters, found {}", name.len());
         problems.push(Diagnostic::new(format!("the name of this {what} is too long")).at(at, label));
-    } else if name.is_empty() || !name.chars().all(allowed) {
-        problems.push(problem.at(at, "expected lower-case letters a-z, digits, `_` and `-`"));
+    } else if name.is_empty() || name.starts_with('-') || !name.chars().all(allowed) {
+        problems.push(problem.at(at, "expected lower-case letters a-z, digits, `_` and, but for the first, `-`"));
     }
 }
 

@@ -8,6 +8,9 @@ use super::topics::Topic;
 use crate::stage::Registry;
 use std::collections::{BTreeMap, BTreeSet};
 
+/// The most readers of an output. What its link reserves grows with their square.
+const MOST_READERS: usize = 64;
+
 /// The wires of a pipeline.
 #[derive(Debug, Default)]
 pub(super) struct Wiring {
@@ -35,6 +38,20 @@ impl Wiring {
     /// Whether an output feeds an input.
     fn is_read(&self, stage: usize, port: usize) -> bool {
         self.inputs.iter().flatten().any(|input| input.from == Output { stage, port })
+    }
+}
+
+/// Reports outputs with so many readers that the memory that their links reserve would be out of proportion.
+pub(super) fn check_readers(drafts: &[Draft<'_>], wiring: &Wiring, problems: &mut Problems) {
+    let mut readers: BTreeMap<(usize, usize), usize> = BTreeMap::new();
+    for input in wiring.inputs.iter().flatten() {
+        *readers.entry((input.from.stage, input.from.port)).or_default() += 1;
+    }
+    for ((stage, port), count) in readers.into_iter().filter(|(_, count)| *count > MOST_READERS) {
+        let Some(draft) = drafts.get(stage) else { continue };
+        let output = draft.kind.and_then(|kind| kind.outputs.get(port)).map_or("", |output| output.name);
+        let title = format!("`{}.{output}` has {count} readers, and an output may have {MOST_READERS}", draft.name);
+        problems.push(Diagnostic::new(title).at(draft.at, "too many stages have it as an input"));
     }
 }
 

@@ -1,6 +1,7 @@
 //! Scans that are added at their poses by odometry, if these are known well enough.
 
 use super::robot::{ScanOutcome, pose_at};
+use super::sessions::Sessions;
 use super::slam_map::{LossCause, LostWay, SlamMap};
 use super::{ScanBeams, ScanMapperParameters};
 use crate::shared::geometry::Pose2;
@@ -33,17 +34,17 @@ impl ScanTimes {
     }
 }
 
-/// Adds a scan at its pose by odometry. If that is not known well enough, the robot has lost its way unless its scan shows it.
+/// Adds a scan at its pose by odometry. If that is not known well enough, a new session begins unless the scan shows it.
 /// `blind` is the last pause in which nothing shows how the robot moved: its end, and its length in seconds.
 pub(super) fn add_along_odometry(
-    slam: &mut SlamMap,
+    sessions: &mut Sessions,
     odometry: &PoseTrack,
     placed: &mut ScanTimes,
     blind: Option<(LogTime, f64)>,
     (time, scan): (LogTime, &ScanBeams),
     parameters: &ScanMapperParameters,
 ) -> ScanOutcome {
-    if slam.lost_way().is_some() {
+    if sessions.current().lost_way().is_some() {
         return ScanOutcome::Used;
     }
     let Some(start) = pose_at(odometry, time, parameters) else { return ScanOutcome::NoPose };
@@ -52,13 +53,14 @@ pub(super) fn add_along_odometry(
         || scan.without_motion(|delay| Some(start.inv_mul(&pose_at(odometry, time.plus_seconds(delay), parameters)?)));
     let mut guess = start;
     let gap = placed.gap(time);
-    if let Some((deviations, lost)) = unseen_motion(slam, blind, gap, time, &start) {
-        let located = slam.relocate(&start, deviations, &still());
+    if let Some((deviations, lost)) = unseen_motion(sessions.current(), blind, gap, time, &start) {
+        let located = sessions.current().relocate(&start, deviations, &still());
         match located.filter(|located| located.is_sure && located.deviation <= parameters.step) {
             Some(located) => guess = located.pose,
-            None => slam.lose_way(lost),
+            None => sessions.begin(lost, parameters),
         }
     }
+    let slam = sessions.current();
     if !slam.is_due(time, &guess, parameters) {
         return ScanOutcome::Used;
     }

@@ -1,4 +1,5 @@
-//! The scans of several robots in one pose graph, where their maps show how they lie to each other.
+//! The scans of several robots, and of several sessions of one, in one pose graph, where their maps show how they lie to each
+//! other.
 
 use super::ScanMapperParameters;
 use super::robot::Robot;
@@ -11,58 +12,79 @@ use crate::shared::geometry::{Grid, Point2, Pose2};
 use crate::shared::scan_grid::SnapshotMap;
 use crate::shared::walls::{NORMAL_RADIUS, WallMap};
 use nalgebra::Vector2;
-use std::collections::BTreeMap;
 
-/// A robot with its map without what is no wall.
+/// A map without what is no wall.
 struct MappedRobot<'a> {
     source: Source<'a>,
     map: SnapshotMap,
 }
 
-/// Where the map of a robot is from.
+/// Where a map is from.
 enum Source<'a> {
-    /// It is drawn of its scans.
-    Scans(&'a mut SlamMap),
-    /// The robot has sent it.
+    /// It is drawn of the scans of a session of a robot, which are numbers.
+    Scans { slam: &'a mut SlamMap, robot: usize, session: usize },
+    /// A robot has sent it.
     Recorded(Box<Trajectory>),
 }
 
-/// A robot of a group, and the pose of its map frame in that of the first.
+/// A map of a group, and the pose of its frame in that of the first.
 struct Member {
     robot: usize,
     frame: Pose2,
 }
 
+/// The poses of the scans of a session, in the frame that its group has in common.
+struct JointSession {
+    robot: usize,
+    session: usize,
+    poses: Vec<Pose2>,
+}
+
 /// Refines the trajectories of robots together whose maps are merged without doubt, each in its own frame as before, with
-/// the maps that others have `recorded`, which are rigid. Trajectories of which the scans contradict each other at the
-/// common poses stay as they are. Returns how many robots with scans are refined with others.
-pub(super) fn refine_together(
-    robots: &mut BTreeMap<String, Robot>,
-    recorded: &BTreeMap<String, SnapshotMap>,
+/// the maps that others have recorded, which are rigid; then each robot goes on with its later sessions in its first one, where
+/// these are among them. Trajectories of which the scans contradict each other at the common poses stay as they are. Returns how
+/// many robots with scans are refined with others.
+pub(super) fn refine_together<'a>(
+    robots: &mut [&mut Robot],
+    recorded: impl Iterator<Item = &'a SnapshotMap>,
     parameters: &ScanMapperParameters,
 ) -> usize {
-    let with_scans: Vec<MappedRobot<'_>> = robots.values_mut().filter_map(MappedRobot::of).collect();
+    let mut with_scans = Vec::new();
+    for (number, robot) in robots.iter_mut().enumerate() {
+        let sessions = robot.slam_maps_mut().enumerate();
+        with_scans.extend(sessions.filter_map(|(session, slam)| MappedRobot::of(slam, number, session)));
+    }
     if with_scans.is_empty() {
         return 0;
     }
-    let recorded = recorded.values().filter_map(MappedRobot::of_map);
+    let recorded = recorded.filter_map(MappedRobot::of_map);
     let mut mapped: Vec<MappedRobot<'_>> = recorded.chain(with_scans).collect();
     let groups = groups(&mapped);
-    groups.iter().map(|group| refine_group(group, &mut mapped, parameters)).sum()
+    let refined: Vec<Vec<JointSession>> =
+        groups.iter().map(|group| refine_group(group, &mut mapped, parameters)).collect();
+    for group in &refined {
+        for (number, robot) in robots.iter_mut().enumerate().filter(|(_, robot)| robot.has_several_sessions()) {
+            let poses = |session| group.iter().find(|joint| (joint.robot, joint.session) == (number, session));
+            let count = robot.slam_maps_mut().count();
+            let poses: Vec<Option<&[Pose2]>> = (0..count).map(|session| Some(&poses(session)?.poses[..])).collect();
+            robot.join_sessions(&poses, parameters);
+        }
+    }
+    (0..robots.len()).filter(|robot| refined.iter().flatten().any(|joint| joint.robot == *robot)).count()
 }
 
 impl<'a> MappedRobot<'a> {
-    /// A robot whose map is built by SLAM, and is right as far as its own scans show.
-    fn of(robot: &'a mut Robot) -> Option<Self> {
-        robot.test_map(true);
-        if robot.bad_scans().is_some() || robot.is_mirrored() {
+    /// A map that is built by SLAM, if it is right as far as its own scans show.
+    fn of(slam: &'a mut SlamMap, robot: usize, session: usize) -> Option<Self> {
+        slam.test(true);
+        if slam.bad_scans().is_some() || slam.is_mirrored() {
             return None;
         }
-        let map = cleaned(robot.map()?)?;
-        Some(Self { source: Source::Scans(robot.slam_map_mut()?), map })
+        let map = cleaned(slam.snapshot()?)?;
+        Some(Self { source: Source::Scans { slam, robot, session }, map })
     }
 
-    /// A robot that has sent its map; none if that is invalid or has no walls.
+    /// A map that a robot has sent; none if that is invalid or has no walls.
     fn of_map(map: &SnapshotMap) -> Option<Self> {
         let map = cleaned(map.clone())?;
         let walls = WallMap::new(&Grid { geometry: map.geometry, cells: &map.cells }, NORMAL_RADIUS);
@@ -76,7 +98,7 @@ impl<'a> MappedRobot<'a> {
 
     fn trajectory(&self) -> &Trajectory {
         match &self.source {
-            Source::Scans(slam) => slam.trajectory(),
+            Source::Scans { slam, .. } => slam.trajectory(),
             Source::Recorded(trajectory) => trajectory,
         }
     }
@@ -84,7 +106,7 @@ impl<'a> MappedRobot<'a> {
     /// Pose of the frame of the trajectory in the map.
     fn transform_map_trajectory(&self) -> Pose2 {
         match &self.source {
-            Source::Scans(slam) => slam.transform_map_trajectory(),
+            Source::Scans { slam, .. } => slam.transform_map_trajectory(),
             Source::Recorded(_) => Pose2::identity(),
         }
     }
@@ -140,10 +162,14 @@ fn groups(robots: &[MappedRobot<'_>]) -> Vec<Vec<Member>> {
     groups
 }
 
-/// Refines the trajectories of a group. Returns how many are refined with others.
-fn refine_group(group: &[Member], robots: &mut [MappedRobot<'_>], parameters: &ScanMapperParameters) -> usize {
+/// Refines the trajectories of a group. Returns the sessions that are refined with others.
+fn refine_group(
+    group: &[Member],
+    robots: &mut [MappedRobot<'_>],
+    parameters: &ScanMapperParameters,
+) -> Vec<JointSession> {
     if group.len() < 2 {
-        return 0;
+        return Vec::new();
     }
     let framed = |Member { robot, frame }: &Member| {
         let robot = &robots[*robot];
@@ -155,19 +181,19 @@ fn refine_group(group: &[Member], robots: &mut [MappedRobot<'_>], parameters: &S
     let placed = joined.iter().map(|(robot, poses)| (robots[*robot].trajectory(), &poses[..]));
     let found = joint_contradictions(&placed.collect::<Vec<_>>());
     if joined.len() < 2 || found.are_more_than(parameters.max_contradicting) {
-        return 0;
+        return Vec::new();
     }
-    let mut count = 0;
-    for (robot, poses) in joined {
-        let Source::Scans(slam) = &mut robots[robot].source else { continue };
+    let mut refined = Vec::new();
+    for (number, poses) in joined {
+        let Source::Scans { slam, robot, session } = &mut robots[number].source else { continue };
         let alone = slam.trajectory().poses().to_vec();
-        slam.move_to(poses);
+        slam.move_to(poses.clone());
         slam.test(true);
         // Of a few scans among many of others all may contradict each other.
         match slam.bad_scans() {
             Some(_) => slam.move_to(alone),
-            None => count += 1,
+            None => refined.push(JointSession { robot: *robot, session: *session, poses }),
         }
     }
-    count
+    refined
 }

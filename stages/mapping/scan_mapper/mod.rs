@@ -16,7 +16,8 @@
 //! in its own frame, so that what one robot saw straightens the map of another.
 //!
 //! A robot whose scans hardly ever lie on each other has lost its way: no map of it is sent. Where nothing shows how a robot
-//! has moved, or after a gap of its scans nothing well enough, its map ends.
+//! with odometry has moved, or after a gap of its scans nothing well enough, a new session begins, whose map is merged with that
+//! of the first one at the end. Where that is not possible, and without odometry, its map ends there.
 //!
 //! - [`ScanBeams`]: the beams of a scan from the base of the robot, within the lidar's limits.
 //! - [`ScanMap`]: the growing map.
@@ -31,6 +32,7 @@ mod robot;
 mod scan_map;
 mod scan_odometry;
 mod scan_usage;
+mod sessions;
 mod slam_map;
 mod stage;
 #[cfg(test)]

@@ -58,14 +58,14 @@ pub(super) fn lost_way(name: &str, seconds: f64, cause: LossCause) -> String {
     let (why, cure) = match cause {
         LossCause::Pause(pause) => (
             format!("nothing shows how it moved in the {pause:.1} s before, and its scans lie on no earlier ones"),
-            CUT_THERE.to_owned(),
+            format!("{CUT_THERE}, with --initial"),
         ),
         LossCause::ScanGap { seconds, deviation } => (
             format!(
                 "it has no scans with odometry of the {seconds:.1} s before, in which odometry may be {deviation:.1} m off (standard \
-                 deviation), and its scan does not show where it is"
+                 deviation), and neither its scan there nor all later ones show beyond doubt where it is"
             ),
-            CUT_THERE.to_owned(),
+            format!("{CUT_THERE}, with --initial"),
         ),
         LossCause::ParallelWalls => (
             "it has no odometry, and its scans do not show how it moved along walls that are bare and parallel"
@@ -76,6 +76,14 @@ pub(super) fn lost_way(name: &str, seconds: f64, cause: LossCause) -> String {
     format!(
         "{name} has lost its way {seconds:.1} s after its first scan: {why}. What it saw from there on is left out of its map. To use \
          it, {cure}"
+    )
+}
+
+/// Where a robot has lost its way so far, so many seconds after its first scan.
+pub(super) fn lost_way_so_far(name: &str, seconds: f64) -> String {
+    format!(
+        "{name} has lost its way {seconds:.1} s after its first scan. Its map stays as it is until the end: then what it sees from there \
+         on is merged with it, if both fit"
     )
 }
 

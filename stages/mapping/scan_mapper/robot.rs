@@ -4,6 +4,7 @@ use super::along_odometry::{ScanTimes, add_along_odometry};
 use super::continuous_odometry::ContinuousOdometry;
 use super::scan_odometry::ScanOdometry;
 use super::scan_usage::ScanUsage;
+use super::sessions::Sessions;
 use super::slam_map::{BadScans, LossCause, LostWay, SlamMap, TagSighting};
 use super::{ScanBeams, ScanMap, ScanMapperParameters, TooLarge};
 use crate::mapping::slam::Contradictions;
@@ -24,7 +25,7 @@ enum Localization {
     /// By poses in its map.
     ByPoses(ScanMap),
     /// By odometry and the registration of scans.
-    ByOdometry(SlamMap),
+    ByOdometry(Sessions),
     /// By the registration of scans alone.
     ByScans(SlamMap, ScanOdometry),
 }
@@ -65,7 +66,7 @@ pub(super) struct Robot {
     pub(super) drawn: Option<[LogTime; 2]>,
     /// Time of the last scan in the map that was sent.
     pub(super) sent_until: Option<LogTime>,
-    /// Whether it was reported that it has lost its way.
+    /// Whether it was reported that it has lost its way and has scans from then on.
     is_loss_reported: bool,
 }
 
@@ -107,7 +108,9 @@ impl Robot {
 
     /// Adds the tags for whose times odometry is known, and at the end of the log the remaining ones as well.
     fn place_tags(&mut self, parameters: &ScanMapperParameters, is_end: bool) {
-        let (Localization::ByOdometry(slam) | Localization::ByScans(slam, _)) = &mut self.localization else { return };
+        if !self.is_by_slam() {
+            return;
+        }
         let latest = self.odometry.latest_time();
         let next_scan = self.waiting.front().map(|(time, _)| *time);
         while let Some((time, tag)) = self.waiting_tags.pop_front() {
@@ -116,8 +119,11 @@ impl Robot {
                 self.waiting_tags.push_front((time, tag));
                 break;
             }
-            if let Some(at) = pose_at(&self.odometry, time, parameters) {
-                slam.see(time, &at, &tag);
+            let Some(at) = pose_at(&self.odometry, time, parameters) else { continue };
+            match &mut self.localization {
+                Localization::ByOdometry(sessions) => sessions.see(time, &at, &tag),
+                Localization::ByScans(slam, _) => slam.see(time, &at, &tag),
+                Localization::NotYet | Localization::ByPoses(_) => {}
             }
         }
     }
@@ -177,7 +183,8 @@ impl Robot {
     /// The map whose poses are found by SLAM; `None` if the robot has other poses, or none yet.
     fn slam_map(&self) -> Option<&SlamMap> {
         match &self.localization {
-            Localization::ByOdometry(slam) | Localization::ByScans(slam, _) => Some(slam),
+            Localization::ByOdometry(sessions) => Some(sessions.first()),
+            Localization::ByScans(slam, _) => Some(slam),
             Localization::NotYet | Localization::ByPoses(_) => None,
         }
     }
@@ -185,7 +192,8 @@ impl Robot {
     /// The same, to be changed.
     pub(super) fn slam_map_mut(&mut self) -> Option<&mut SlamMap> {
         match &mut self.localization {
-            Localization::ByOdometry(slam) | Localization::ByScans(slam, _) => Some(slam),
+            Localization::ByOdometry(sessions) => Some(sessions.first_mut()),
+            Localization::ByScans(slam, _) => Some(slam),
             Localization::NotYet | Localization::ByPoses(_) => None,
         }
     }
@@ -203,7 +211,7 @@ impl Robot {
     /// Length of its ways as a share of that by odometry, if its scans are registered along odometry.
     pub(super) fn odometry_scale(&self) -> Option<f64> {
         match &self.localization {
-            Localization::ByOdometry(slam) => Some(slam.odometry_scale()),
+            Localization::ByOdometry(sessions) => Some(sessions.first().odometry_scale()),
             _ => None,
         }
     }
@@ -212,7 +220,7 @@ impl Robot {
     /// lidar as it is given. `None` if none is steady, or its scans are not registered along odometry.
     pub(super) fn similarity_to_scans(&self) -> Option<(f64, f64, f64)> {
         match &self.localization {
-            Localization::ByOdometry(slam) => slam.similarity_to_scans(),
+            Localization::ByOdometry(sessions) => sessions.first().similarity_to_scans(),
             _ => None,
         }
     }
@@ -222,11 +230,17 @@ impl Robot {
         self.slam_map().is_some_and(SlamMap::sees_nothing)
     }
 
-    /// Seconds from the first scan to where it has lost its way, and why; given once.
-    pub(super) fn take_lost_way(&mut self) -> Option<(f64, LossCause)> {
+    /// Seconds from the first scan to where it has lost its way, and why.
+    pub(super) fn lost_way(&self) -> Option<(f64, LossCause)> {
         let LostWay { time, cause } = self.slam_map()?.lost_way()?;
-        let is_reported = std::mem::replace(&mut self.is_loss_reported, true);
-        Some((time.seconds_since(self.usage.first()?), cause)).filter(|_| !is_reported)
+        Some((time.seconds_since(self.usage.first()?), cause))
+    }
+
+    /// Seconds from the first scan to where it has lost its way with scans from then on; given once.
+    pub(super) fn take_new_session(&mut self) -> Option<f64> {
+        let (seconds, _) = self.lost_way().filter(|_| self.has_several_sessions() && !self.is_loss_reported)?;
+        self.is_loss_reported = true;
+        Some(seconds)
     }
 
     /// Starts to register scans, along odometry if there is any, once no poses came for long enough or none will come.
@@ -235,7 +249,7 @@ impl Robot {
         let has_waited = |latest: LogTime| is_end || latest.seconds_since(first) >= parameters.wait_for_poses;
         match (self.odometry.latest_time(), self.waiting.back()) {
             (Some(latest), _) if has_waited(latest) => {
-                self.localization = Localization::ByOdometry(SlamMap::new(parameters));
+                self.localization = Localization::ByOdometry(Sessions::new(parameters));
             }
             (None, Some((newest, _))) if has_waited(*newest) => {
                 self.localization = Localization::ByScans(SlamMap::new(parameters), ScanOdometry::default());
@@ -269,11 +283,42 @@ impl Robot {
             self.draw_at_poses(parameters, is_end, outcome);
         }
         self.place_tags(parameters, is_end);
-        let Some(slam) = self.slam_map_mut() else { return };
-        if is_end {
-            slam.finish();
+        match &mut self.localization {
+            Localization::ByOdometry(sessions) if is_end => sessions.finish(),
+            Localization::ByScans(slam, _) if is_end => slam.finish(),
+            _ => {}
         }
-        self.drawn = slam.times();
+        self.update_times();
+    }
+
+    /// The times of the first and the last scan in the map, where its poses are found by SLAM.
+    fn update_times(&mut self) {
+        if let Some(slam) = self.slam_map() {
+            self.drawn = slam.times();
+        }
+    }
+
+    /// All of its maps whose poses are found by SLAM: several where it has lost its way.
+    pub(super) fn slam_maps_mut(&mut self) -> impl Iterator<Item = &mut SlamMap> {
+        let (sessions, alone) = match &mut self.localization {
+            Localization::ByOdometry(sessions) => (Some(sessions.all_mut()), None),
+            Localization::ByScans(slam, _) => (None, Some(slam)),
+            Localization::NotYet | Localization::ByPoses(_) => (None, None),
+        };
+        sessions.into_iter().flatten().chain(alone)
+    }
+
+    /// Whether it has lost its way and has scans from then on.
+    pub(super) fn has_several_sessions(&self) -> bool {
+        matches!(&self.localization, Localization::ByOdometry(sessions) if sessions.are_several())
+    }
+
+    /// Goes on with later sessions in the first one, where the poses of their scans are known in one frame.
+    pub(super) fn join_sessions(&mut self, poses: &[Option<&[Pose2]>], parameters: &ScanMapperParameters) {
+        if let Localization::ByOdometry(sessions) = &mut self.localization {
+            sessions.join(poses, parameters.max_contradicting);
+        }
+        self.update_times();
     }
 
     /// Adds the scans for whose beams poses are known, by a localizer or by odometry.
@@ -304,9 +349,9 @@ impl Robot {
                     }
                     drawn
                 }
-                Localization::ByOdometry(slam) => {
+                Localization::ByOdometry(sessions) => {
                     let blind = self.continuous.blind_pause();
-                    add_along_odometry(slam, &self.odometry, &mut self.placed, blind, (time, &scan), parameters)
+                    add_along_odometry(sessions, &self.odometry, &mut self.placed, blind, (time, &scan), parameters)
                 }
             });
         }
@@ -317,10 +362,7 @@ impl Robot {
         match &mut self.localization {
             Localization::NotYet => None,
             Localization::ByPoses(map) => map.snapshot(),
-            Localization::ByOdometry(slam) | Localization::ByScans(slam, _) => {
-                slam.draw();
-                slam.map().snapshot()
-            }
+            Localization::ByOdometry(_) | Localization::ByScans(..) => self.slam_map_mut()?.snapshot(),
         }
     }
 

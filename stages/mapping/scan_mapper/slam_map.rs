@@ -3,6 +3,7 @@
 use super::{BaseBeam, ScanBeams, ScanMap, ScanMapperParameters};
 use crate::mapping::slam::{Contradictions, LocatedScan, ScanPoint, Trajectory, scan_points};
 use crate::shared::geometry::{Point2, Pose2, pose, wrap_angle};
+use crate::shared::scan_grid::SnapshotMap;
 use gridweave_runtime::message::LogTime;
 
 /// Largest share of the scans that may lie on no others, for a map to be drawn.
@@ -227,6 +228,15 @@ impl SlamMap {
         self.forget_map();
     }
 
+    /// Goes on with the scans of a later session, at poses relative to the first scan of this one.
+    pub(super) fn append(&mut self, session: Self, poses: Vec<Pose2>) {
+        self.trajectory.append(session.trajectory, poses);
+        self.scans.extend(session.scans);
+        self.first_unmatched = self.first_unmatched.or(session.first_unmatched);
+        self.lost_way = session.lost_way;
+        self.forget_map();
+    }
+
     /// Looks for the last loop closures, when there will be no more scans.
     pub(super) fn finish(&mut self) {
         if self.trajectory.finish() {
@@ -247,7 +257,7 @@ impl SlamMap {
     }
 
     /// Draws the scans that are not in the map.
-    pub(super) fn draw(&mut self) {
+    fn draw(&mut self) {
         let mut beams = ScanBeams { transform_base_lidar: Pose2::identity(), beams: Vec::new(), duration: 0.0 };
         while let Some(scan) = self.scans.get(self.drawn) {
             beams.transform_base_lidar = scan.transform_base_lidar;
@@ -269,9 +279,10 @@ impl SlamMap {
         std::mem::take(&mut self.left_out)
     }
 
-    /// The map of the scans that were drawn.
-    pub(super) fn map(&self) -> &ScanMap {
-        &self.map
+    /// The map of all scans; none if no cell is known.
+    pub(super) fn snapshot(&mut self) -> Option<SnapshotMap> {
+        self.draw();
+        self.map.snapshot()
     }
 
     /// Time of the first and of the last scan.

@@ -1,7 +1,9 @@
 //! The stage `scan_mapper`.
 
 use super::joint_refinement::refine_together;
-use super::reasons::{TOO_LARGE, lost_way, too_large, turned_lidar, upside_down, why_bad, wrong_scale};
+use super::reasons::{
+    TOO_LARGE, lost_way, lost_way_so_far, too_large, turned_lidar, upside_down, why_bad, wrong_scale,
+};
 use super::robot::{Robot, ScanOutcome};
 use super::slam_map::TagSighting;
 use super::{MappingMode, ScanBeams, ScanMapperParameters};
@@ -222,8 +224,9 @@ impl ScanMapper {
             }
             ScanOutcome::TooLarge => output.warn(too_large(name)),
         });
-        if let Some((seconds, cause)) = robot.take_lost_way() {
-            output.warn(lost_way(name, seconds, cause));
+        let is_online = self.parameters.mode == MappingMode::Online && !is_end;
+        if let Some(seconds) = robot.take_new_session().filter(|_| is_online) {
+            output.warn(lost_way_so_far(name, seconds));
         }
     }
 
@@ -271,10 +274,18 @@ impl ScanMapper {
             self.draw(name, true, output);
         }
         if self.parameters.joint_refinement {
-            let count = refine_together(&mut self.robots, &self.recorded, &self.parameters);
+            let mut robots: Vec<&mut Robot> = self.robots.values_mut().collect();
+            let count = refine_together(&mut robots, self.recorded.values(), &self.parameters);
             output.count("robots refined together", count as u64);
+        } else {
+            for robot in self.robots.values_mut().filter(|robot| robot.has_several_sessions()) {
+                refine_together(&mut [robot], std::iter::empty(), &self.parameters);
+            }
         }
         for name in names {
+            if let Some((seconds, cause)) = self.robots.get(&name).and_then(Robot::lost_way) {
+                output.warn(lost_way(&name, seconds, cause));
+            }
             self.send(&name, true, output)?;
             if let Some(robot) = self.robots.get_mut(&name) {
                 explain(&name, robot, &self.parameters, output)?;

@@ -212,6 +212,31 @@ impl Trajectory {
         self.local_map.take();
     }
 
+    /// Appends the scans of another trajectory, which is finished, at poses in the frame of this one.
+    pub fn append(&mut self, other: Self, poses: Vec<Pose2>) {
+        let (first, path) = (self.scans.len(), self.path());
+        let constraints = other.graph.constraints.into_iter();
+        self.graph.poses.extend(poses);
+        self.graph.constraints.extend(constraints.map(|own| Constraint {
+            from: first + own.from,
+            to: first + own.to,
+            ..own
+        }));
+        self.lidars.extend(other.lidars);
+        self.paths.extend(other.paths.iter().map(|at| path + at));
+        self.scans.extend(other.scans);
+        self.submaps.extend(other.submaps.iter().map(|submap| first + submap.start..first + submap.end));
+        self.submap_start = self.scans.len();
+        self.unmatched += other.unmatched;
+        self.local_map.take();
+        for sighting in &other.graph.sightings {
+            let tag = other.tags.landmarks().find(|(_, landmark)| *landmark == sighting.landmark);
+            tag.into_iter().for_each(|(tag, _)| {
+                self.see(first + sighting.from, tag, sighting.place, sighting.deviation);
+            });
+        }
+    }
+
     /// Adds a scan of a robot that has moved by `moved` since the last one, by odometry: its points, and the position of the
     /// lidar, in the frame of the base. Returns whether a loop closure has moved earlier scans.
     pub fn add(&mut self, moved: &Pose2, points: Vec<ScanPoint>, lidar: Point2) -> bool {

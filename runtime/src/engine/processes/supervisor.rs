@@ -308,10 +308,16 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Kills a process that sends no reports, for example because it was suspended, or that exceeds its memory limit.
+    /// Kills a process that sends no reports, for example because it was suspended, or that exceeds its memory limit. Ends the run
+    /// if its folder is gone.
     fn check_processes(&mut self) {
         let awake_for = self.awake_for;
         if self.stopping.is_some() {
+            return;
+        }
+        // Without it, processes that are starting would wait for each other for ever.
+        if !self.folder.path().exists() {
+            self.fail(RunError::of_run(Failure::NoFolder(self.folder.path().display().to_string())));
             return;
         }
         let living =

@@ -258,10 +258,23 @@ fn a_topic_is_a_path_of_bounded_length() {
 }
 
 #[test]
+fn an_output_has_a_limited_number_of_readers() {
+    let with = |readers: usize| {
+        let reader = |number| format!("[stages.out{number}]\nkind = \"mcap_sink\"\ninputs = [\"log.map\"]\n");
+        let stages: String = (0..readers).map(reader).collect();
+        format!("[stages.log]\nkind = \"mcap_source\"\n{stages}")
+    };
+    parse(&with(64)).unwrap();
+    let error = only_error(&with(65));
+    assert_eq!(error.title, "`log.map` has 65 readers, and an output may have 64");
+}
+
+#[test]
 fn a_stage_has_a_short_plain_name() {
-    let says = ["expected lower-case letters a-z, digits, `_` and `-`"];
+    let says = ["expected lower-case letters a-z, digits, `_` and, but for the first, `-`"];
     assert_error(("[stages.out]", "[stages.Out]"), "28:9", "Out", &says);
     assert_error(("[stages.out]", "[stages.\"o u\"]"), "28:9", "\"o u\"", &says);
+    assert_error(("[stages.out]", "[stages.\"-h\"]"), "28:9", "\"-h\"", &says);
     assert_error(("[stages.out]", "[stages.\"\"]"), "28:9", "\"\"", &says);
     let long = "a".repeat(65);
     let says = ["expected at most 64 characters, found 65"];
