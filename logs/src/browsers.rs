@@ -5,7 +5,7 @@
 
 mod web_socket;
 
-pub use web_socket::Pings;
+pub use web_socket::{Frame, Pings, Relayed};
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
@@ -120,6 +120,8 @@ pub struct Request {
     pub origin: Option<String>,
     /// All bytes that were read.
     pub bytes: Vec<u8>,
+    /// How many of them are the request. The others belong to what it asks for.
+    pub length: usize,
 }
 
 impl Connection {
@@ -187,13 +189,20 @@ impl Connection {
     }
 
     /// Relays a WebSocket between the browser and a server until either closes, or the browser does not read, or does not
-    /// answer pings, for a while. `first` is what the browser has sent already.
+    /// answer pings, for a while, or sends a message that is too long. `request` is what the browser has sent already. What
+    /// the server has sent is reported once the browser has been sent it.
     ///
     /// # Errors
     /// The server cannot be reached, or a thread cannot be started.
-    pub fn relay(self, server: SocketAddr, first: &[u8], pings: Pings) -> io::Result<()> {
+    pub fn relay(
+        self,
+        server: SocketAddr,
+        request: &Request,
+        pings: Pings,
+        report: impl FnMut(Relayed<'_>),
+    ) -> io::Result<()> {
         let mut server = TcpStream::connect(server)?;
-        server.write_all(first)?;
+        server.write_all(&request.bytes)?;
         let browser = &self.stream;
         browser.set_read_timeout(Some(pings.timeout))?;
         browser.set_write_timeout(Some(SEND_TIMEOUT))?;
@@ -206,11 +215,10 @@ impl Connection {
         };
         thread::scope(|scope| {
             thread::Builder::new().spawn_scoped(scope, || {
-                let (mut from, mut to) = (browser, &server);
-                let _ = io::copy(&mut from, &mut to);
+                let _ = web_socket::copy_short_messages(browser, &server, &request.bytes[request.length..]);
                 end();
             })?;
-            let _ = web_socket::copy_with_pings(&server, browser, pings);
+            let _ = web_socket::copy_with_pings(&server, browser, pings, report);
             end();
             Ok(())
         })
@@ -248,7 +256,7 @@ fn parse(bytes: &[u8]) -> Parsed {
     let mut request = httparse::Request::new(&mut headers);
     match request.parse(bytes) {
         Ok(httparse::Status::Partial) => Parsed::Part,
-        Ok(httparse::Status::Complete(_)) => {
+        Ok(httparse::Status::Complete(length)) => {
             let header = |name: &str| {
                 let found = request.headers.iter().find(|header| header.name.eq_ignore_ascii_case(name));
                 found.map(|header| String::from_utf8_lossy(header.value).into_owned())
@@ -259,6 +267,7 @@ fn parse(bytes: &[u8]) -> Parsed {
                 host: header("Host"),
                 origin: header("Origin"),
                 bytes: bytes.to_vec(),
+                length,
             })
         }
         Err(_) => Parsed::Invalid,
@@ -275,7 +284,9 @@ mod tests {
         let Parsed::Whole(request) = parse(whole) else { panic!() };
         assert_eq!((request.method.as_str(), request.path.as_str()), ("GET", "/live"));
         assert_eq!((request.host.as_deref(), request.origin), (Some("a.example"), None));
-        assert_eq!(request.bytes, whole);
+        assert_eq!((request.length, request.bytes.as_slice()), (whole.len(), &whole[..]));
+        let Parsed::Whole(request) = parse(&[whole, &b"more"[..]].concat()) else { panic!() };
+        assert_eq!(&request.bytes[request.length..], b"more");
         assert!((0..whole.len()).all(|length| matches!(parse(&whole[..length]), Parsed::Part)));
         assert!(matches!(parse(b"\x16\x03\x01 hello"), Parsed::Invalid));
     }

@@ -4,8 +4,9 @@
 //! unchanged: ROS 2 messages in CDR with their definitions, on the topics that they would have in a log.
 //!
 //! Foxglove's protocol has no latched topics. So the latest message of each latched topic is retained here, and sent to
-//! each client that subscribes to it; for `/tf_static`, the latest transform of each frame. For a slow client, the
-//! oldest messages in its queue are dropped; the run never waits for a client.
+//! each client that subscribes to it; for `/tf_static`, the latest transform of each frame. The run never waits for a
+//! client. At most 32 MiB wait for one, and 256 MiB for all together; a message that is larger is sent where nothing
+//! waits. A slow client gets fewer messages, and of a latched topic the latest.
 //!
 //! At most 32 clients are let in, and no pages of foreign sites.
 //!
@@ -14,8 +15,11 @@
 
 mod front;
 mod retained;
+mod servers;
 mod stage;
 mod statistics;
+mod viewers;
+mod waiting;
 
 use gridweave_runtime::stage::{Output, ParameterError, Parameters, StageKind};
 use schemars::JsonSchema;

@@ -1,23 +1,20 @@
-//! Retained messages: the latest message of each latched topic, for late joiners.
+//! Retained messages: the latest message of each latched topic, for late joiners and for viewers that are behind.
 
 use crate::tf::is_static;
-use foxglove::websocket::{ChannelView, Client, ServerListener};
-use foxglove::{ChannelId, PartialMetadata, RawChannel, SinkId};
+use foxglove::{ChannelId, RawChannel};
 use gridweave_runtime::ros::{RosMessage, TFMessage, TransformStamped, decode, encode};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 /// The latest messages of the latched channels.
-///
-/// The lock is also held while a message is sent: otherwise a client that subscribes at that time could get an older
-/// message after a newer one.
-#[derive(Clone, Default)]
-pub(super) struct RetainedMessages(Arc<Mutex<Vec<Retained>>>);
+#[derive(Default)]
+pub(super) struct RetainedMessages(Vec<Retained>);
 
 /// The latest message of one channel.
-struct Retained {
-    channel: Arc<RawChannel>,
-    log_time: u64,
+pub(super) struct Retained {
+    pub(super) channel: Arc<RawChannel>,
+    pub(super) log_time: u64,
     what: What,
 }
 
@@ -29,30 +26,18 @@ enum What {
 }
 
 impl RetainedMessages {
-    /// Sends a message to all subscribers of its channel, and retains it if the channel is latched.
-    pub(super) fn send(&self, channel: &Arc<RawChannel>, is_latched: bool, log_time: u64, message: &[u8]) {
-        let mut retained = self.lock();
-        if is_latched {
-            let place =
-                retained.iter().position(|retained| retained.channel.id() == channel.id()).unwrap_or_else(|| {
-                    retained.push(Retained { channel: Arc::clone(channel), log_time, what: What::Message(Vec::new()) });
-                    retained.len() - 1
-                });
-            retained[place].keep(log_time, message);
-        }
-        channel.log_with_meta(message, PartialMetadata::with_log_time(log_time));
+    /// Retains a message.
+    pub(super) fn keep(&mut self, channel: &Arc<RawChannel>, log_time: u64, message: &[u8]) {
+        let place = self.0.iter().position(|retained| retained.channel.id() == channel.id()).unwrap_or_else(|| {
+            self.0.push(Retained { channel: Arc::clone(channel), log_time, what: What::Message(Vec::new()) });
+            self.0.len() - 1
+        });
+        self.0[place].keep(log_time, message);
     }
 
-    /// Sends the retained messages of a channel to a client that has just subscribed.
-    fn send_to(&self, subscriber: Option<SinkId>, channel: ChannelId) {
-        if let Some(retained) = self.lock().iter().find(|retained| retained.channel.id() == channel) {
-            retained.send_to(subscriber);
-        }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, Vec<Retained>> {
-        // The retained messages are consistent between any two changes.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    /// What is retained of a channel, if it is latched and has had a message.
+    pub(super) fn of(&self, channel: ChannelId) -> Option<&Retained> {
+        self.0.iter().find(|retained| retained.channel.id() == channel)
     }
 }
 
@@ -73,14 +58,12 @@ impl Retained {
         }
     }
 
-    fn send_to(&self, subscriber: Option<SinkId>) {
-        let metadata = PartialMetadata::with_log_time(self.log_time);
+    /// The message; `None` if it cannot be written.
+    pub(super) fn message(&self) -> Option<Cow<'_, [u8]>> {
         match &self.what {
-            What::Message(message) => self.channel.log_with_meta_to_sink(message, metadata, subscriber),
+            What::Message(message) => Some(message.into()),
             What::Transforms(retained) => {
-                if let Ok(message) = encode(&TFMessage { transforms: retained.values().cloned().collect() }) {
-                    self.channel.log_with_meta_to_sink(&message, metadata, subscriber);
-                }
+                encode(&TFMessage { transforms: retained.values().cloned().collect() }).ok().map(Cow::from)
             }
         }
     }
@@ -88,10 +71,4 @@ impl Retained {
 
 fn by_frame(message: TFMessage) -> impl Iterator<Item = (String, TransformStamped)> {
     message.transforms.into_iter().map(|transform| (transform.child_frame_id.clone(), transform))
-}
-
-impl ServerListener for RetainedMessages {
-    fn on_subscribe(&self, client: Client, channel: ChannelView<'_>) {
-        self.send_to(client.sink_id(), channel.id());
-    }
 }

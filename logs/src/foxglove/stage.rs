@@ -1,19 +1,21 @@
 //! The stage around the Foxglove server.
 
-use super::retained::RetainedMessages;
+use super::servers::Servers;
 use super::statistics::Statistics;
+use super::viewers::Viewers;
 use super::{FoxgloveParameters, front};
-use crate::browsers::BrowserServer;
+use crate::browsers::{BrowserServer, Connection, Request};
+use crate::os_error;
 use crate::qos::is_transient_local;
 use crate::reader::SupplementKind;
 use crate::sink::given_frames::GivenFrames;
 use crate::sink::result_channel;
 use crate::sink::routing::{ResultTopics, Route, is_tf};
-use foxglove::{ChannelBuilder, FoxgloveError, RawChannel, Schema, WebSocketServer, WebSocketServerHandle};
+use foxglove::{ChannelBuilder, RawChannel, Schema};
 use gridweave_runtime::message::{Channel, FixedText, Message};
 use gridweave_runtime::stage::{Context, InputWire, Output, StageError};
 use std::collections::BTreeMap;
-use std::io;
+use std::io::{self, ErrorKind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -26,12 +28,12 @@ struct Shown {
 
 /// Sends messages to Foxglove.
 pub(super) struct FoxgloveSink {
-    /// Where clients connect; `None` after the end, as the server is.
+    /// Where clients connect; `None` after the end.
     front: Option<BrowserServer>,
-    server: Option<WebSocketServerHandle>,
+    servers: Servers,
     /// The served channels, which are closed on drop.
     context: Arc<foxglove::Context>,
-    retained: RetainedMessages,
+    viewers: Viewers,
     statistics: Statistics,
     result_topics: ResultTopics,
     given_frames: GivenFrames,
@@ -46,25 +48,18 @@ pub(super) struct FoxgloveSink {
 impl FoxgloveSink {
     pub(super) fn new(parameters: FoxgloveParameters, context: &Context) -> Result<Self, StageError> {
         let FoxgloveParameters { host, port, backlog, origins } = parameters;
-        let (channels, retained) = (foxglove::Context::new(), RetainedMessages::default());
-        let failed = |error: io::Error| cannot_serve(&host, port, &FoxgloveError::Bind(error));
-        let inner = front::random_address().map_err(failed)?;
-        let server = WebSocketServer::new()
-            .name("gridweave")
-            .context(&channels)
-            .listener(Arc::new(retained.clone()))
-            .message_backlog_size(backlog)
-            .bind(inner.to_string(), 0)
-            .start_blocking()
-            .map_err(|error| cannot_serve(&host, port, &error))?;
-        let front = front::start(&host, port, (inner, server.port()).into(), origins).map_err(failed)?;
+        let (channels, viewers) = (foxglove::Context::new(), Viewers::default());
+        let servers = Servers::new(Arc::clone(&channels), viewers.clone(), backlog);
+        let serving = servers.clone();
+        let serve = move |client: Connection, request: &Request| serving.serve(client, request);
+        let front = front::start(&host, port, origins, serve).map_err(|error| cannot_serve(&host, port, &error))?;
         tracing::info!("serving Foxglove on ws://{host}:{}", front.address().port());
         Ok(Self {
             front: Some(front),
-            server: Some(server),
-            statistics: Statistics::start(context.statistics.clone(), &channels, retained.clone()),
+            servers,
+            statistics: Statistics::start(context.statistics.clone(), &channels, viewers.clone()),
             context: channels,
-            retained,
+            viewers,
             result_topics: ResultTopics::new(context),
             given_frames: GivenFrames::new(context),
             inputs: context.inputs.clone(),
@@ -118,7 +113,7 @@ impl FoxgloveSink {
                 }
             }
             output.count("messages", 1);
-            self.retained.send(raw, *is_latched, header.log_time.0, &bytes);
+            self.viewers.send(raw, *is_latched, header.log_time.0, &bytes);
             self.statistics.log_time.store(header.log_time.0, Ordering::Relaxed);
         }
         Ok(())
@@ -142,10 +137,7 @@ impl FoxgloveSink {
     pub(super) fn close(&mut self) {
         self.statistics.end();
         self.front = None;
-        if let Some(server) = self.server.take() {
-            // Does not wait for clients: one that does not read could block the end of the run.
-            drop(server.stop());
-        }
+        self.servers.close();
     }
 }
 
@@ -155,11 +147,47 @@ impl Drop for FoxgloveSink {
     }
 }
 
-fn cannot_serve(host: &str, port: u16, error: &FoxgloveError) -> StageError {
-    let cause = match error {
-        FoxgloveError::Bind(cause) => cause.to_string(),
-        other => other.to_string(),
+fn cannot_serve(host: &str, port: u16, error: &io::Error) -> StageError {
+    let another = "choose another, as in --view=8766 or port = 8766";
+    let help = match error.kind() {
+        ErrorKind::AddrInUse => Some(format!("another program may have that port: {another}")),
+        ErrorKind::AddrNotAvailable => {
+            Some("this machine has no such address: choose one that it has, or 0.0.0.0 for all".to_owned())
+        }
+        ErrorKind::PermissionDenied => Some(format!("not every user may have that port: {another}")),
+        // The system has no number for a name that is not found.
+        _ if error.raw_os_error().is_none() => {
+            Some("the host must be an address of this machine, or a name of it that is known here".to_owned())
+        }
+        _ => None,
     };
-    StageError::new(format!("serve Foxglove on {host}:{port}"), cause)
-        .with_help("another program may have that port: choose another, as in --view=8766 or port = 8766")
+    let error = StageError::new(format!("serve Foxglove on {host}:{port}"), os_error::of_reading(error));
+    match help {
+        Some(help) => error.with_help(help),
+        None => error,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rustix::io::Errno;
+
+    #[test]
+    fn the_advice_on_an_address_that_cannot_be_bound_is_for_its_reason() {
+        let advice = |error: &io::Error| cannot_serve("192.0.2.1", 80, error).to_string();
+        let of_system = |errno: Errno| advice(&io::Error::from_raw_os_error(errno.raw_os_error()));
+        for (errno, said) in [
+            (Errno::ADDRINUSE, "another program"),
+            (Errno::ADDRNOTAVAIL, "no such address"),
+            (Errno::ACCESS, "not every user"),
+            (Errno::MFILE, "ulimit -n"),
+        ] {
+            let text = of_system(errno);
+            assert!(text.contains(said), "{text}");
+            assert_eq!(text.contains("another program"), errno == Errno::ADDRINUSE, "{text}");
+        }
+        let unknown = advice(&io::Error::other("failed to lookup address information: Name or service not known"));
+        assert!(unknown.contains("an address of this machine") && !unknown.contains("another program"), "{unknown}");
+    }
 }

@@ -1,6 +1,6 @@
 //! The progress of a run's stages, for viewers.
 
-use super::retained::RetainedMessages;
+use super::viewers::Viewers;
 use foxglove::{ChannelBuilder, Schema};
 use gridweave_runtime::stage::RunStatistics;
 use serde_json::json;
@@ -28,11 +28,7 @@ pub(super) struct Statistics {
 
 impl Statistics {
     /// Starts publishing; does nothing if the engine has no statistics, or a thread cannot be started.
-    pub(super) fn start(
-        run: Option<RunStatistics>,
-        context: &Arc<foxglove::Context>,
-        retained: RetainedMessages,
-    ) -> Self {
+    pub(super) fn start(run: Option<RunStatistics>, context: &Arc<foxglove::Context>, viewers: Viewers) -> Self {
         let log_time = Arc::new(AtomicU64::new(0));
         let schema = Schema::new(SCHEMA_NAME, "jsonschema", SCHEMA.as_bytes());
         let raw = ChannelBuilder::new(TOPIC).message_encoding("json").schema(schema).context(context).build_raw().ok();
@@ -44,7 +40,7 @@ impl Statistics {
                     let log_time = seen.load(Ordering::Relaxed);
                     if log_time != 0 {
                         let message = json!({ "stages": run.now() }).to_string();
-                        retained.send(&raw, true, log_time, message.as_bytes());
+                        viewers.send(&raw, true, log_time, message.as_bytes());
                     }
                 }
             };

@@ -10,7 +10,7 @@ use zstd::zstd_safe::{CCtx, CParameter, DCtx, DParameter, get_error_name, get_fr
 /// The compression level: higher ones take much longer than they save.
 const LEVEL: i32 = 3;
 /// The base-2 logarithm of the largest window, which covers two maps of 64 million cells.
-const LARGEST_WINDOW: u32 = 27;
+pub(super) const LARGEST_WINDOW: u32 = 27;
 const SMALLEST_WINDOW: u32 = 10;
 /// The maximum size of a message, and of a batch, bytes: a few packed bytes can claim, and expand to, any size.
 pub(super) const MAX_SIZE: usize = 128 << 20;

@@ -17,7 +17,8 @@
 //! 2. **Batches.** A sender sends a batch with all pending messages, up to 128 KB, as a Zenoh query under the
 //!    receiver's key. The receiver forwards the messages and then answers. A batch without an answer is sent again,
 //!    with the same bytes and number; the receiver answers a batch that it has taken already again. So one batch is in
-//!    flight at a time, and batches grow on a slow connection.
+//!    flight at a time, and batches grow on a slow connection. A receiver keeps one batch of a session, and a limited
+//!    number and size of all: what it does not keep ends without an answer.
 //! 3. **Handshake.** Batch 0 lists the links, without messages. Its answer contains the receiver's clock.
 //! 4. **Restart.** A receiver that misses the state that a batch depends on rejects it. The sender repeats the
 //!    handshake, and sends all channels, the pending messages, and the last message of each topic, as for late joiners
@@ -33,6 +34,7 @@
 #![forbid(unsafe_code)]
 
 mod absent_senders;
+mod arrivals;
 mod certificates;
 mod channel_numbers;
 pub mod clock;
@@ -49,6 +51,7 @@ pub mod source;
 mod tap;
 #[cfg(test)]
 mod tests;
+mod warning_texts;
 mod wire;
 pub mod zenoh_session;
 

@@ -1,6 +1,7 @@
 //! The stage `bridge_source`: receives messages of other machines over a bridge into a live pipeline.
 
 use super::absent_senders::AbsentSenders;
+use super::arrivals::{Arrival, Arrivals, ArrivedBatch};
 use super::certificates::Certificates;
 use super::channel_numbers::ChannelNumbers;
 use super::clock::Clock;
@@ -9,6 +10,7 @@ use super::ingest::{Ingest, Item, Taken};
 use super::network::{BASE, Network, is_part_of_key};
 use super::presence::{Presence, Role, watch};
 use super::report;
+use super::warning_texts::WarningTexts;
 use super::wire::{Link, to_bytes};
 use super::zenoh_session::in_words;
 use gridweave_logs::schemas::schema_text;
@@ -21,15 +23,15 @@ use gridweave_runtime::stage::{
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::Arc;
 use std::time::Duration;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::query::{Query, Queryable};
 use zenoh::{Session, Wait};
 
-/// The maximum number of events handled at a time.
+/// The maximum number of arrivals handled at a time.
 const BATCHES: usize = 16;
 
 /// The parameters of `bridge_source`.
@@ -148,17 +150,10 @@ impl Ports {
     }
 }
 
-enum SourceEvent {
-    Sender(Presence, bool),
-    Batch(Query, i64),
-}
-
 /// The receiving end of a bridge.
 pub(super) struct BridgeSource {
     ingest: Ingest,
-    events: Receiver<SourceEvent>,
-    /// The received events that were not handled yet.
-    waiting: VecDeque<SourceEvent>,
+    arrivals: Arc<Arrivals<Query>>,
     key: String,
     clock: Clock,
     /// The connected senders.
@@ -170,8 +165,7 @@ pub(super) struct BridgeSource {
     end_after: Option<usize>,
     /// The addresses where others connect, as text.
     listen_text: String,
-    /// The reasons of refused connections that were logged.
-    refusals: BTreeSet<String>,
+    warnings: WarningTexts,
     channels: ChannelNumbers,
     _token: LivelinessToken,
     _queryable: Queryable<()>,
@@ -186,21 +180,20 @@ impl BridgeSource {
         let me = Presence { name: parameters.receiver, number };
         let key = me.key(&network.bridge, Role::Receiver);
         let clock = Clock::default();
-        let (to, events) = channel();
-        let batches = to.clone();
-        // A batch that arrives while the stage ends is not answered, and sent again to the next receiver.
-        let take = move |query: Query| drop(batches.send(SourceEvent::Batch(query, clock.nanoseconds())));
+        let arrivals = Arc::new(Arrivals::default());
+        let batches = Arc::clone(&arrivals);
+        let take = move |query: Query| batches.add_query(query, clock.nanoseconds());
         let queryable = session.declare_queryable(key.clone()).callback(take).wait();
         let queryable = queryable.map_err(|error| StageError::new("receive over the bridge", in_words(&error)))?;
+        let senders = Arc::clone(&arrivals);
         watch(&session, &network.bridge, Role::Sender, move |sender, is_present| {
-            drop(to.send(SourceEvent::Sender(sender, is_present)));
+            senders.add_sender(sender, is_present);
         })?;
         let token = me.declare(&session, &network.bridge, Role::Receiver)?;
         let tolerance = (parameters.clock_tolerance * 1e9) as i64;
         Ok(Self {
             ingest: Ingest::new(number, tolerance),
-            events,
-            waiting: VecDeque::new(),
+            arrivals,
             key,
             clock,
             senders: BTreeSet::new(),
@@ -208,7 +201,7 @@ impl BridgeSource {
             ended: BTreeSet::new(),
             end_after: parameters.end_after,
             listen_text: network.listen_text(),
-            refusals: BTreeSet::new(),
+            warnings: WarningTexts::default(),
             channels: ChannelNumbers::default(),
             _token: token,
             _queryable: queryable,
@@ -223,7 +216,10 @@ impl BridgeSource {
             let is_other =
                 |other: &Presence| other.name == name && *other != sender && !self.ended.contains(&other.number);
             if self.senders.iter().any(is_other) {
-                warn(output, format!("two senders are called `{name}`: give one of them another name by `sender`"));
+                self.warn(
+                    output,
+                    &format!("two senders are called `{name}`: give one of them another name by `sender`"),
+                );
             }
             tracing::info!("the sender `{name}` is there");
             output.count("times that a sender came", 1);
@@ -235,25 +231,34 @@ impl BridgeSource {
             true => self.ingest.forget(sender.number),
             false => {
                 self.absent.add(sender).into_iter().for_each(|session| self.ingest.forget(session));
-                warn(output, format!("the sender `{name}` is gone without having ended"));
+                // Each time is logged, not only the first.
+                let text = self.warnings.limited(&format!("the sender `{name}` is gone without having ended"));
+                tracing::warn!("{text}");
+                output.warn_logged(text);
             }
         }
     }
 
-    /// Reports refused connections. They are retried, so each reason is logged once.
+    /// Warns with a text that may hold what a sender has written. Each text is logged once.
+    fn warn(&mut self, output: &Output<Ports>, text: &str) {
+        output.warn(self.warnings.limited(text));
+    }
+
+    /// Reports refused connections, and batches that were not kept. Both are tried again.
     fn note_refusals(&mut self, output: &Output<Ports>) {
         for reason in take_refusals() {
-            let text = format!("a connection to {} was refused: {reason}", self.listen_text);
             output.count("refused connections", 1);
-            match self.refusals.insert(reason) {
-                true => warn(output, text),
-                false => output.warn(text),
-            }
+            self.warn(output, &format!("a connection to {} was refused: {reason}", self.listen_text));
+        }
+        let left_out = self.arrivals.take_left_out();
+        if left_out > 0 {
+            output.count("batches left out, to be sent again", left_out);
+            output.warn("batches were left out, because others of their senders, or too many, were waiting");
         }
     }
 
-    fn take_batch(&mut self, query: &Query, came: i64, output: &Output<Ports>) -> Result<(), StageError> {
-        let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
+    fn take_batch(&mut self, batch: ArrivedBatch<Query>, output: &Output<Ports>) -> Result<(), StageError> {
+        let ArrivedBatch { query, bytes, came, .. } = batch;
         let (taken, answer) = self.ingest.take(&bytes);
         let sender = taken.sender.clone();
         self.report_batch(&taken, output);
@@ -272,21 +277,21 @@ impl BridgeSource {
             replied.map_err(|error| in_words(&error))
         });
         if let Err(wrong) = answered {
-            warn(output, format!("cannot answer the sender `{sender}`: {wrong}"));
+            self.warn(output, &format!("cannot answer the sender `{sender}`: {wrong}"));
         }
         Ok(())
     }
 
     /// Warns of a batch that cannot be read, of dropped messages, and of a wrong clock.
-    fn report_batch(&self, taken: &Taken, output: &Output<Ports>) {
+    fn report_batch(&mut self, taken: &Taken, output: &Output<Ports>) {
         let sender = &taken.sender;
         if let Some(wrong) = &taken.wrong {
-            warn(output, format!("cannot read a batch of the sender `{sender}`: {wrong}"));
+            self.warn(output, &format!("cannot read a batch of the sender `{sender}`: {wrong}"));
         }
         if taken.dropped > 0 {
-            warn(
+            self.warn(
                 output,
-                format!(
+                &format!(
                     "the sender `{sender}` has dropped messages, because its queue was full or later ones superseded them"
                 ),
             );
@@ -296,9 +301,9 @@ impl BridgeSource {
             Some(0) => tracing::info!("the clock of the sender `{sender}` is right"),
             Some(offset) => {
                 let (seconds, way) = (offset.unsigned_abs() as f64 * 1e-9, if offset < 0 { "ahead" } else { "behind" });
-                warn(
+                self.warn(
                     output,
-                    format!("the clock of the sender `{sender}` is {seconds:.0} s {way}: its times are corrected"),
+                    &format!("the clock of the sender `{sender}` is {seconds:.0} s {way}: its times are corrected"),
                 );
             }
             None => {}
@@ -311,7 +316,7 @@ impl BridgeSource {
                 let Some((index, port)) = output.of(&link) else { return Ok(()) };
                 match self.channels.describe((index, sender, number, String::new()), &channel) {
                     Some(here) => port.out.announce(here, &channel)?,
-                    None => warn(output, format!("a channel on `{}` was left out: {TOO_MANY}", channel.topic)),
+                    None => self.warn(output, &format!("a channel on `{}` was left out: {TOO_MANY}", channel.topic)),
                 }
                 Ok(())
             }
@@ -356,29 +361,26 @@ pub(super) fn channel_of(topic: &str, ros_type: &str, definition: &str) -> Chann
     }
 }
 
-fn warn(output: &Output<Ports>, text: String) {
-    tracing::warn!("{text}");
-    output.warn_logged(text);
+impl Drop for BridgeSource {
+    fn drop(&mut self) {
+        self.arrivals.close();
+    }
 }
 
 impl Source for BridgeSource {
     type Outputs = Ports;
 
     fn wait(&mut self, longest: Duration) {
-        if self.waiting.is_empty()
-            && let Ok(event) = self.events.recv_timeout(longest)
-        {
-            self.waiting.push_back(event);
-        }
+        self.arrivals.wait(longest);
     }
 
     fn next(&mut self, output: &Output<Ports>) -> Result<bool, StageError> {
         self.note_refusals(output);
         for _ in 0..BATCHES {
-            let Some(event) = self.waiting.pop_front().or_else(|| self.events.try_recv().ok()) else { break };
-            match event {
-                SourceEvent::Sender(sender, is_present) => self.note_sender(sender, is_present, output),
-                SourceEvent::Batch(query, came) => self.take_batch(&query, came, output)?,
+            match self.arrivals.next() {
+                Some(Arrival::Sender(sender, is_present)) => self.note_sender(sender, is_present, output),
+                Some(Arrival::Batch(batch)) => self.take_batch(batch, output)?,
+                None => break,
             }
         }
         Ok(self.end_after.is_none_or(|senders| self.ended.len() < senders))

@@ -1,5 +1,7 @@
 //! An outbox and an ingest with a network between them that loses, repeats and delays.
 
+mod floods;
+
 use super::clock::Clock;
 use super::difference::difference;
 use super::ingest::{Ingest, Item, Taken};

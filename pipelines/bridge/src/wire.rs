@@ -7,13 +7,15 @@ use gridweave_runtime::ros::{decode, encode};
 use serde::de::{DeserializeOwned, Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt;
+use std::io::Read as _;
 use std::marker::PhantomData;
+use zstd::stream::read::Decoder;
 
 /// The version of the protocol. Ends of different versions report an error, and transport nothing.
 pub(super) const VERSION: u32 = 1;
 
 /// A batch of a sender, which the receiver takes as a whole or not at all.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Batch {
     /// The name of the sender.
     pub(super) sender: String,
@@ -66,6 +68,31 @@ fn limited<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> R
     }
 
     deserializer.deserialize_seq(Limited(PhantomData))
+}
+
+/// The first fields of a [`Batch`].
+#[derive(Deserialize)]
+struct Head {
+    #[allow(dead_code, reason = "it is before the session")]
+    sender: String,
+    session: u64,
+}
+
+/// The size of the restored beginning of a batch that holds its [`Head`], bytes: the name of a sender has at most 100.
+const HEAD_SIZE: u64 = 256;
+
+/// The session of the sender of an encoded [`Batch`], if it can be read. Only the first bytes are restored, so it takes
+/// little time and memory, whatever the rest expands to.
+pub(super) fn session_of(bytes: &[u8]) -> Option<u64> {
+    let (version, packed) = bytes.split_first_chunk::<4>()?;
+    if u32::from_le_bytes(*version) != VERSION {
+        return None;
+    }
+    let mut decoder = Decoder::with_buffer(packed).ok()?;
+    decoder.window_log_max(difference::LARGEST_WINDOW).ok()?;
+    let mut plain = Vec::new();
+    decoder.take(HEAD_SIZE).read_to_end(&mut plain).ok()?;
+    decode::<Head>(&plain).ok().map(|head| head.session)
 }
 
 /// A link of a bridge.
@@ -191,6 +218,21 @@ pub(super) fn from_bytes<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, String>
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_session_of_a_batch_is_read_from_its_first_bytes() {
+        let sender = "r".repeat(100);
+        let entry = Entry::new(0, &MessageHeader::default(), Form::Whole, vec![7; 3 << 20]);
+        let batch = Batch { sender, session: 0x1234_5678_9abc, entries: vec![entry], ..Batch::default() };
+        let bytes = to_bytes(&batch).unwrap();
+        assert_eq!(session_of(&bytes), Some(batch.session));
+        assert_eq!(session_of(&to_bytes(&Batch { session: 3, ..Batch::default() }).unwrap()), Some(3));
+        for unreadable in [&b""[..], b"abc", b"\x01\0\0\0 and so on", &bytes[..20]] {
+            assert_eq!(session_of(unreadable), None);
+        }
+        let other_version = [&[9, 0, 0, 0], &bytes[4..]].concat();
+        assert_eq!(session_of(&other_version), None);
+    }
 
     #[test]
     fn an_answer_is_decoded_and_truncated_or_other_bytes_are_errors() {
