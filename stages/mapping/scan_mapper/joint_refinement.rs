@@ -3,6 +3,7 @@
 
 use super::ScanMapperParameters;
 use super::robot::Robot;
+use super::sessions::Sessions;
 use super::slam_map::SlamMap;
 use crate::mapping::map_cleaner::{MapCleanerParameters, clean};
 use crate::mapping::slam::{FramedTrajectory, ScanPoint, Trajectory, joint_contradictions, joint_poses, recorded_map};
@@ -51,7 +52,7 @@ pub(super) fn refine_together<'a>(
 ) -> usize {
     let mut with_scans = Vec::new();
     for (number, robot) in robots.iter_mut().enumerate() {
-        let sessions = robot.slam_maps_mut().enumerate();
+        let sessions = robot.sessions_mut().into_iter().flat_map(Sessions::all_mut).enumerate();
         with_scans.extend(sessions.filter_map(|(session, slam)| MappedRobot::of(slam, number, session)));
     }
     if with_scans.is_empty() {
@@ -63,9 +64,9 @@ pub(super) fn refine_together<'a>(
     let refined: Vec<Vec<JointSession>> =
         groups.iter().map(|group| refine_group(group, &mut mapped, parameters)).collect();
     for group in &refined {
-        for (number, robot) in robots.iter_mut().enumerate().filter(|(_, robot)| robot.has_several_sessions()) {
+        for (number, robot) in robots.iter_mut().enumerate().filter(|(_, robot)| robot.session_count() > 1) {
             let poses = |session| group.iter().find(|joint| (joint.robot, joint.session) == (number, session));
-            let count = robot.slam_maps_mut().count();
+            let count = robot.session_count();
             let poses: Vec<Option<&[Pose2]>> = (0..count).map(|session| Some(&poses(session)?.poses[..])).collect();
             robot.join_sessions(&poses, parameters);
         }

@@ -27,7 +27,7 @@ enum Localization {
     /// By odometry and the registration of scans.
     ByOdometry(Sessions),
     /// By the registration of scans alone.
-    ByScans(SlamMap, ScanOdometry),
+    ByScans(Sessions, ScanOdometry),
 }
 
 /// Outcome of a scan.
@@ -120,10 +120,8 @@ impl Robot {
                 break;
             }
             let Some(at) = pose_at(&self.odometry, time, parameters) else { continue };
-            match &mut self.localization {
-                Localization::ByOdometry(sessions) => sessions.see(time, &at, &tag),
-                Localization::ByScans(slam, _) => slam.see(time, &at, &tag),
-                Localization::NotYet | Localization::ByPoses(_) => {}
+            if let Some(sessions) = self.sessions_mut() {
+                sessions.see(time, &at, &tag);
             }
         }
     }
@@ -180,22 +178,25 @@ impl Robot {
         std::mem::take(&mut self.kept_odometry)
     }
 
-    /// The map whose poses are found by SLAM; `None` if the robot has other poses, or none yet.
-    fn slam_map(&self) -> Option<&SlamMap> {
+    /// The maps whose poses are found by SLAM; `None` if the robot has other poses, or none yet.
+    fn sessions(&self) -> Option<&Sessions> {
         match &self.localization {
-            Localization::ByOdometry(sessions) => Some(sessions.first()),
-            Localization::ByScans(slam, _) => Some(slam),
+            Localization::ByOdometry(sessions) | Localization::ByScans(sessions, _) => Some(sessions),
             Localization::NotYet | Localization::ByPoses(_) => None,
         }
     }
 
     /// The same, to be changed.
-    pub(super) fn slam_map_mut(&mut self) -> Option<&mut SlamMap> {
+    pub(super) fn sessions_mut(&mut self) -> Option<&mut Sessions> {
         match &mut self.localization {
-            Localization::ByOdometry(sessions) => Some(sessions.first_mut()),
-            Localization::ByScans(slam, _) => Some(slam),
+            Localization::ByOdometry(sessions) | Localization::ByScans(sessions, _) => Some(sessions),
             Localization::NotYet | Localization::ByPoses(_) => None,
         }
+    }
+
+    /// That of the first session, which is the map of the robot.
+    fn slam_map(&self) -> Option<&SlamMap> {
+        self.sessions().map(Sessions::first)
     }
 
     /// Whether its poses are found by SLAM.
@@ -238,7 +239,7 @@ impl Robot {
 
     /// Seconds from the first scan to where it has lost its way with scans from then on; given once.
     pub(super) fn take_new_session(&mut self) -> Option<f64> {
-        let (seconds, _) = self.lost_way().filter(|_| self.has_several_sessions() && !self.is_loss_reported)?;
+        let (seconds, _) = self.lost_way().filter(|_| self.session_count() > 1 && !self.is_loss_reported)?;
         self.is_loss_reported = true;
         Some(seconds)
     }
@@ -252,7 +253,7 @@ impl Robot {
                 self.localization = Localization::ByOdometry(Sessions::new(parameters));
             }
             (None, Some((newest, _))) if has_waited(*newest) => {
-                self.localization = Localization::ByScans(SlamMap::new(parameters), ScanOdometry::default());
+                self.localization = Localization::ByScans(Sessions::new(parameters), ScanOdometry::default());
             }
             _ => {}
         }
@@ -266,7 +267,9 @@ impl Robot {
         is_end: bool,
         mut outcome: impl FnMut(ScanOutcome),
     ) {
-        if let Localization::ByScans(slam, odometry) = &mut self.localization {
+        if let Localization::ByScans(sessions, odometry) = &mut self.localization {
+            // Without odometry a robot that has lost its way begins no other session.
+            let slam = sessions.current();
             for (time, scan) in self.waiting.drain(..) {
                 if slam.lost_way().is_some() {
                     continue;
@@ -283,10 +286,8 @@ impl Robot {
             self.draw_at_poses(parameters, is_end, outcome);
         }
         self.place_tags(parameters, is_end);
-        match &mut self.localization {
-            Localization::ByOdometry(sessions) if is_end => sessions.finish(),
-            Localization::ByScans(slam, _) if is_end => slam.finish(),
-            _ => {}
+        if let Some(sessions) = self.sessions_mut().filter(|_| is_end) {
+            sessions.finish();
         }
         self.update_times();
     }
@@ -298,24 +299,14 @@ impl Robot {
         }
     }
 
-    /// All of its maps whose poses are found by SLAM: several where it has lost its way.
-    pub(super) fn slam_maps_mut(&mut self) -> impl Iterator<Item = &mut SlamMap> {
-        let (sessions, alone) = match &mut self.localization {
-            Localization::ByOdometry(sessions) => (Some(sessions.all_mut()), None),
-            Localization::ByScans(slam, _) => (None, Some(slam)),
-            Localization::NotYet | Localization::ByPoses(_) => (None, None),
-        };
-        sessions.into_iter().flatten().chain(alone)
-    }
-
-    /// Whether it has lost its way and has scans from then on.
-    pub(super) fn has_several_sessions(&self) -> bool {
-        matches!(&self.localization, Localization::ByOdometry(sessions) if sessions.are_several())
+    /// Number of its sessions: several where it has lost its way and has scans from then on.
+    pub(super) fn session_count(&self) -> usize {
+        self.sessions().map_or(0, Sessions::count)
     }
 
     /// Goes on with later sessions in the first one, where the poses of their scans are known in one frame.
     pub(super) fn join_sessions(&mut self, poses: &[Option<&[Pose2]>], parameters: &ScanMapperParameters) {
-        if let Localization::ByOdometry(sessions) = &mut self.localization {
+        if let Some(sessions) = self.sessions_mut() {
             sessions.join(poses, parameters.max_contradicting);
         }
         self.update_times();
@@ -362,13 +353,13 @@ impl Robot {
         match &mut self.localization {
             Localization::NotYet => None,
             Localization::ByPoses(map) => map.snapshot(),
-            Localization::ByOdometry(_) | Localization::ByScans(..) => self.slam_map_mut()?.snapshot(),
+            Localization::ByOdometry(sessions) | Localization::ByScans(sessions, _) => sessions.first_mut().snapshot(),
         }
     }
 
     /// Takes the number of scans that were left out of the map by SLAM since the last time, as it would get too large.
     pub(super) fn take_left_out(&mut self) -> usize {
-        self.slam_map_mut().map_or(0, SlamMap::take_left_out)
+        self.sessions_mut().map_or(0, |sessions| sessions.first_mut().take_left_out())
     }
 
     /// Whether its scans turn against its odometry.
@@ -378,7 +369,7 @@ impl Robot {
 
     /// Tests the map that is built by SLAM, at the end in any case: how often its scans contradict each other.
     pub(super) fn test_map(&mut self, is_end: bool) -> Option<&Contradictions> {
-        let slam = self.slam_map_mut()?;
+        let slam = self.sessions_mut()?.first_mut();
         slam.test(is_end);
         slam.contradictions()
     }

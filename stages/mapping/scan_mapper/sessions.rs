@@ -45,15 +45,15 @@ impl Sessions {
         std::iter::once(&mut self.first).chain(&mut self.later)
     }
 
-    /// Whether there are several.
-    pub(super) fn are_several(&self) -> bool {
-        !self.later.is_empty()
+    /// How many there are.
+    pub(super) fn count(&self) -> usize {
+        1 + self.later.len()
     }
 
     /// Ends the current session, and begins another one, if there are not too many.
     pub(super) fn begin(&mut self, lost: LostWay, parameters: &ScanMapperParameters) {
         self.current().lose_way(lost);
-        if self.later.len() + 1 < MOST_SESSIONS {
+        if self.count() < MOST_SESSIONS {
             self.later.push(SlamMap::new(parameters));
         }
     }

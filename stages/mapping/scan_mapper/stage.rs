@@ -278,7 +278,7 @@ impl ScanMapper {
             let count = refine_together(&mut robots, self.recorded.values(), &self.parameters);
             output.count("robots refined together", count as u64);
         } else {
-            for robot in self.robots.values_mut().filter(|robot| robot.has_several_sessions()) {
+            for robot in self.robots.values_mut().filter(|robot| robot.session_count() > 1) {
                 refine_together(&mut [robot], std::iter::empty(), &self.parameters);
             }
         }
