@@ -159,10 +159,7 @@ impl PipelineErrors {
         if self.is_unreadable {
             return text.trim_end().to_owned();
         }
-        // All may be in the settings of the command line.
-        let marked = self.list.iter().map(|diagnostic| diagnostic.marks.first().map_or(0, |(at, _)| at.source));
-        let source = marked.reduce(|one, other| if one == other { one } else { 0 }).unwrap_or_default();
-        let name = self.sources.get(source).map_or("the pipeline", |source| source.name.as_str());
+        let name = self.sources.first().map_or("the pipeline", |file| file.name.as_str());
         let count = match self.list.len() {
             count if self.has_more => format!("more errors than these {count}: fix these first"),
             1 => "an error".to_owned(),

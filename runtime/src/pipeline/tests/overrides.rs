@@ -31,19 +31,6 @@ fn settings_go_before_the_file_and_the_last_one_counts() {
 }
 
 #[test]
-fn errors_in_settings_are_those_of_the_command_line_and_not_of_the_file() {
-    let text = load(&with(&["lines.no_parameter=1"])).unwrap_err().to_string();
-    assert!(text.contains("no_parameter") && !text.contains("walls.toml has"), "{text}");
-    let both = Pipeline::parse(
-        "walls.toml",
-        &VALID.replace("seed = 7", "sed = 7"),
-        &registry(),
-        &with(&["lines.no_parameter=1"]),
-    );
-    assert!(both.unwrap_err().to_string().ends_with("walls.toml has 2 errors"));
-}
-
-#[test]
 fn an_initial_pose_is_typed_in_numbers_and_the_reference_lies_at_the_origin() {
     let typed = |texts: &[&str]| {
         let mut overrides = Overrides::default();
