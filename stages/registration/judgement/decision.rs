@@ -173,10 +173,8 @@ impl Decision {
         let is_judged = !matches!(refusal, Refusal::OutsideWindow { .. } | Refusal::NoSuchHypothesis { .. });
         let lacks_probability = is_judged && !matches!(refusal, Refusal::Deformed { .. });
         if lacks_probability {
-            // A value below the bound is not shown as the bound.
-            let thousandths = 1000.0 * self.probability;
-            let is_below = thousandths.round() < 1000.0 * accept;
-            let probability = if is_below { thousandths.round() } else { thousandths.floor() } / 1000.0;
+            // Rounded down, so that a value below the bound is not shown as the bound.
+            let probability = (1000.0 * self.probability).floor() / 1000.0;
             writeln!(text, "missing: a probability of {accept} (--set {stage}.accept); this is {probability:.3}")?;
         }
         if let Some(advice) = refusal.advice(robot_b) {
