@@ -4,7 +4,7 @@
 //! corridors along y join them. Every room has a door to its corridor, so that every room can be reached. Coordinates
 //! are those of the building: x from 0 to its width, y from 0 to its height, metres.
 
-use super::furniture::{furnish_corridor, furnish_room, shelve_room};
+use super::furniture::{equip_room, furnish_corridor, furnish_room, shelve_room};
 use super::room::{Door, Room, WALL};
 use super::shape::{Rectangle, Solid, between};
 use crate::shared::geometry::Point2;
@@ -27,6 +27,9 @@ pub enum Layout {
     Symmetric,
     /// All rooms are alike, but for the furniture.
     Repeated,
+    /// As `repeated`, and in each room the same equipment stands at the same place, as in a ward or a hotel. Rooms of
+    /// one size have the same equipment in every building.
+    Equipped,
     /// Rooms as in `random`, with rows of shelves all through them instead of furniture, as in a warehouse or a
     /// library.
     Shelves,
@@ -36,6 +39,11 @@ impl Layout {
     /// Whether no two rooms are alike.
     fn is_random(self) -> bool {
         matches!(self, Self::Random | Self::Shelves)
+    }
+
+    /// Whether all rooms are alike.
+    fn is_repeated(self) -> bool {
+        matches!(self, Self::Repeated | Self::Equipped)
     }
 }
 
@@ -191,7 +199,7 @@ impl FloorPlan {
 
     /// Divides the part of a row between two corridors along y into rooms.
     fn rooms_of_span(&mut self, row: &Row, (left, right): (f64, f64), size: &BuildingSize, random: &mut impl Rng) {
-        let is_repeated = size.layout == Layout::Repeated;
+        let is_repeated = size.layout.is_repeated();
         let walls = divide(left, right, size, random);
         let mut doors = vec![Vec::new(); walls.len().saturating_sub(1)];
         for (pair, doors) in walls.windows(2).zip(&mut doors) {
@@ -250,7 +258,12 @@ impl FloorPlan {
 fn furniture_of(room: &Room, size: &BuildingSize, random: &mut impl Rng) -> Vec<Solid> {
     match size.layout {
         Layout::Shelves => shelve_room(room, random),
-        _ => furnish_room(room, size.clutter, random),
+        Layout::Equipped => {
+            let mut solids = equip_room(room);
+            solids.extend(furnish_room(room, &solids, size.clutter, random));
+            solids
+        }
+        Layout::Random | Layout::Symmetric | Layout::Repeated => furnish_room(room, &[], size.clutter, random),
     }
 }
 
@@ -287,7 +300,7 @@ fn spans(width: f64, crossings: &[(f64, f64)]) -> Vec<(f64, f64)> {
 /// Places of the walls that divide a span into rooms of about the given width, its ends among them.
 fn divide(left: f64, right: f64, size: &BuildingSize, random: &mut impl Rng) -> Vec<f64> {
     let rooms = ((right - left) / size.room_width).round().max(1.0) as usize;
-    let (narrow, wide) = if size.layout == Layout::Repeated { (1.0, 1.0) } else { (0.7, 1.3) };
+    let (narrow, wide) = if size.layout.is_repeated() { (1.0, 1.0) } else { (0.7, 1.3) };
     let weights: Vec<f64> = (0..rooms).map(|_| between(random, narrow, wide)).collect();
     let total: f64 = weights.iter().sum();
     let mut walls = vec![left];

@@ -3,25 +3,29 @@
 //! A piece either stands against a wall or leaves a passage on all its sides; pieces leave a passage between each
 //! other, and doors stay clear. So no piece can cut a room in two.
 
-use super::room::Room;
+use super::room::{Door, Room};
 use super::shape::{Rectangle, Solid, between};
 use crate::shared::geometry::{Point2, pose};
-use rand::{Rng, RngExt};
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::f64::consts::FRAC_PI_2;
 
 /// What a robot passes with ease, metres.
 const PASSAGE: f64 = 0.95;
 /// The least width of the way between shelves and the walls of their room, where doors stay clear, metres.
 const SHELVES_FROM_WALLS: f64 = 1.3;
+/// Pieces of equipment a square metre.
+const EQUIPMENT: (f64, f64) = (0.05, 0.3);
 /// How often a place is looked for before a piece is given up.
 const TRIES: usize = 8;
 /// Metres of corridor for each pilaster when there is one piece of furniture in 10 square metres.
 const PILASTER_SPACING: f64 = 6.0;
 
-/// Furniture of a room: `clutter` pieces a square metre, fewer where they find no place.
-pub(super) fn furnish_room(room: &Room, clutter: f64, random: &mut impl Rng) -> Vec<Solid> {
+/// Furniture of a room beside what stands there: `clutter` pieces a square metre, fewer where they find no place.
+pub(super) fn furnish_room(room: &Room, standing: &[Solid], clutter: f64, random: &mut impl Rng) -> Vec<Solid> {
     let wanted = room.bounds.width() * room.bounds.height() * clutter;
     let doors: Vec<Rectangle> = room.doors.iter().map(|door| door.clearing(1.1)).collect();
+    let standing: Vec<Rectangle> = standing.iter().filter_map(|solid| Rectangle::bounding(&solid.corners)).collect();
     let mut pieces: Vec<(Rectangle, Solid)> = Vec::new();
     for _ in 0..random_count(wanted, random) {
         for _ in 0..TRIES {
@@ -29,7 +33,7 @@ pub(super) fn furnish_room(room: &Room, clutter: f64, random: &mut impl Rng) -> 
             let Some(bounds) = Rectangle::bounding(&solid.corners) else { break };
             let wide = bounds.expanded(PASSAGE);
             let fits = doors.iter().all(|door| !door.overlaps(&bounds))
-                && pieces.iter().all(|(other, _)| !other.overlaps(&wide))
+                && pieces.iter().map(|(other, _)| other).chain(&standing).all(|other| !other.overlaps(&wide))
                 && if against_wall { leaves_passage(&room.bounds, &bounds) } else { holds(&room.bounds, &wide) };
             if fits {
                 pieces.push((bounds, solid));
@@ -38,6 +42,33 @@ pub(super) fn furnish_room(room: &Room, clutter: f64, random: &mut impl Rng) -> 
         }
     }
     pieces.into_iter().map(|(_, solid)| solid).collect()
+}
+
+/// The equipment of a room: the same pieces at the same places in every room of its size, as seen from its door.
+pub(super) fn equip_room(room: &Room) -> Vec<Solid> {
+    let Some(door) = room.doors.first() else { return Vec::new() };
+    let Rectangle { min, max } = room.bounds;
+    // To a decimetre, as rooms of one size differ by rounding.
+    let [width, depth] = [room.bounds.width(), room.bounds.height()].map(|side| (10.0 * side).floor() / 10.0);
+    let mut random = ChaCha8Rng::seed_from_u64(((1e4 * width).round() + (10.0 * depth).round()) as u64);
+    let clutter = between(&mut random, EQUIPMENT.0, EQUIPMENT.1);
+    let door_at = Point2::new(door.centre.x - min.x, 0.0);
+    let model = Room { bounds: Rectangle::new(0.0, 0.0, width, depth), doors: vec![Door { centre: door_at, ..*door }] };
+    let is_door_above = door.centre.y > max.y;
+    let place = |point: &Point2| {
+        let y = if is_door_above { max.y - point.y } else { min.y + point.y };
+        Point2::new(min.x + point.x, y)
+    };
+    let pieces = furnish_room(&model, &[], clutter, &mut random).into_iter();
+    let placed = pieces.map(|piece| {
+        let mut corners: Vec<Point2> = piece.corners.iter().map(place).collect();
+        // A mirrored piece has its corners in the other order.
+        if is_door_above {
+            corners.reverse();
+        }
+        Solid { corners }
+    });
+    placed.collect()
 }
 
 /// Rows of shelves along the longer side of a room, with aisles between them, ways across, and a way all round. None in

@@ -39,8 +39,8 @@ pub struct SimulatorParameters {
     #[schemars(range(min = 0.0, max = 1.0))]
     pub clutter: f64,
     /// Layout of the rooms: `random`, `symmetric` (a corridor and its rooms look the same after half a turn),
-    /// `repeated` (all rooms are alike), or `shelves` (as `random`, with rows of shelves). Furniture is placed at
-    /// random in all but the last.
+    /// `repeated` (all rooms are alike), `equipped` (the same, with the same equipment in each room), or `shelves` (as
+    /// `random`, with rows of shelves). Furniture is placed at random in all but the last.
     pub layout: Layout,
     /// Share of the rooms whose furniture stands elsewhere for each robot.
     #[schemars(range(min = 0.0, max = 1.0))]

@@ -121,7 +121,7 @@ pub fn compare(
         constraints,
         residual: residual(&regions),
         centre: centroid(&on_wall),
-        details: Details::of(a, b, &compared),
+        details: Details::of(a, b, transform_a_b, &compared),
         ..Default::default()
     };
     for region in &regions {

@@ -3,16 +3,22 @@
 //! The long walls of two wings of a building are alike, and so are those of rooms in a row. What stands in them is not:
 //! at the wrong one of two places that are alike, long walls agree and details contradict each other. So agreement
 //! is measured for details alone, too.
+//!
+//! A thing in the middle of a room shows most: a wall that is drawn roughly, or is a little off as its map is deformed,
+//! looks like a short piece of wall in conflict, but is near a wall of the other map.
 
 use super::MapView;
 use super::regions::{ComparedWall, Finding};
+use crate::shared::geometry::Pose2;
 use crate::shared::walls::WallExtent;
 
-// Both sizes were chosen by cross-validation, with the weights of the judgement.
+// All three were chosen by cross-validation, with the weights of the judgement.
 /// A connected component of less extent is a thing in a room, metres.
 const SMALL_COMPONENT: f64 = 3.0;
 /// A straight segment of less extent is a detail of a wall, metres.
 const SHORT_SEGMENT: f64 = 1.5;
+/// A thing is on open floor where the other map has no wall within this, metres.
+const OPEN_FLOOR: f64 = 1.0;
 /// Added to both lengths before taking their ratio, metres: a thing or two that were moved are little evidence.
 const MORE_WALL: f64 = 5.0;
 
@@ -39,6 +45,9 @@ pub struct Details {
     pub components: WallLengths,
     /// Short straight segments of walls, and of small components.
     pub segments: WallLengths,
+    /// Length of the outlines of small connected components that stand on open floor of the other map, of both maps,
+    /// metres.
+    pub on_open_floor: f64,
 }
 
 impl Details {
@@ -47,11 +56,12 @@ impl Details {
         self.segments.inlier < self.segments.conflict
     }
 
-    /// The details among the walls that were compared.
-    pub(super) fn of(a: &MapView<'_>, b: &MapView<'_>, compared: &[ComparedWall]) -> Self {
+    /// The details among the walls that were compared with map b at `transform_a_b`.
+    pub(super) fn of(a: &MapView<'_>, b: &MapView<'_>, transform_a_b: &Pose2, compared: &[ComparedWall]) -> Self {
+        let transform_b_a = transform_a_b.inverse();
         let mut details = Self::default();
         for wall in compared {
-            let map = if wall.of_b { b.walls } else { a.walls };
+            let (map, other) = if wall.of_b { (b.walls, a.walls) } else { (a.walls, b.walls) };
             let WallExtent { component, segment } = map.extents[wall.index];
             // Both directions are summed, so each counts one half.
             let length = 0.5 * map.spacing;
@@ -65,6 +75,12 @@ impl Details {
                     _ => {}
                 }
             }
+            if wall.finding == Finding::Conflict && component < SMALL_COMPONENT {
+                let in_other = if wall.of_b { wall.point } else { transform_b_a * wall.point };
+                if other.walls.nearest(&in_other, OPEN_FLOOR).is_none() {
+                    details.on_open_floor += map.spacing;
+                }
+            }
         }
         details
     }
@@ -75,7 +91,7 @@ mod tests {
     use super::*;
     use crate::registration::comparison::compare;
     use crate::registration::judgement::JudgementParameters;
-    use crate::shared::geometry::{Pose2, pose};
+    use crate::shared::geometry::pose;
     use crate::shared::test_world::floor_plan::{DrawnMap, FloorPlan, drawing, seen};
     use std::f64::consts::PI;
 
@@ -106,6 +122,7 @@ mod tests {
         assert!(there.components.log_ratio() < -1.0, "{there:?}");
         assert!(there.segments.log_ratio() < here.segments.log_ratio() - 2.0, "{there:?}");
         assert!(!here.contradict());
+        assert!(here.on_open_floor == 0.0 && there.on_open_floor > 5.0, "{there:?}");
     }
 
     #[test]

@@ -99,8 +99,7 @@ impl Candidate {
             Basis::Tags | Basis::FewTags | Basis::Unknown => None,
         });
         let highest = |one: (f64, f64), other: (f64, f64)| (one.0.max(other.0), one.1.max(other.1));
-        let cost = self.deformed.map_or(0.0, |deformed| deformed.cost);
-        Terms::new(peaks.fold((0.0, 0.0), highest), self.deviation(), &self.agreement, cost)
+        Terms::new(peaks.fold((0.0, 0.0), highest), self.deviation(), &self.agreement)
     }
 
     /// Largest standard deviation of the centroid of the inliers over all directions, metres.

@@ -132,8 +132,10 @@ fn refusal(decision: &Decision, of_others: f64, parameters: &JudgementParameters
     }
     let agreement = candidate.agreement;
     Some(match decision.weakest_term() {
-        Term::ConflictingWalls => Refusal::Contradiction { agreement },
-        Term::ShortSegments if agreement.details.contradict() => Refusal::Contradiction { agreement },
+        weakest @ (Term::ConflictingWalls | Term::ThingsOnOpenFloor) => Refusal::Contradiction { agreement, weakest },
+        weakest @ Term::ShortSegments if agreement.details.contradict() => {
+            Refusal::Contradiction { agreement, weakest }
+        }
         weakest => Refusal::Chance { agreement, weakest, probability: *probability, accept },
     })
 }

@@ -1,7 +1,7 @@
 //! Judges all hypotheses for a pair of maps against each other, and gives each a probability.
 //!
 //! The log-odds of a hypothesis is a sum of [`Term`]s: peak significance of the search, common area, walls that agree
-//! and walls that contradict, details, and the deformation of map b; and a prior from tags and from initial poses. The
+//! and walls that contradict, details, and things on open floor; and a prior from tags and from initial poses. The
 //! probability of each is `exp(s_i) / (1 + sum of exp(s_j))` over all hypotheses, where the 1 is for none of them (a
 //! conditional logit; McFadden 1974). So a hypothesis that fits nearly as well takes probability away, wherever it
 //! comes from: another peak of the search, other tags, or a self-similar part of the building ([`SelfSimilarity`]).

@@ -44,6 +44,8 @@ pub enum Refusal {
     Contradiction {
         /// Agreement of the maps.
         agreement: Agreement,
+        /// The term by which it is most below a usual right hypothesis.
+        weakest: Term,
     },
     /// Another hypothesis fits nearly as well.
     #[error(
@@ -142,8 +144,12 @@ fn chance(agreement: &Agreement, weakest: Term) -> String {
     }
 }
 
-/// One line for maps that contradict each other.
-fn contradiction(agreement: &Agreement) -> String {
+/// One line for maps that contradict each other, by the term which is the weakest.
+fn contradiction(agreement: &Agreement, weakest: Term) -> String {
+    if weakest == Term::ThingsOnOpenFloor && agreement.inlier_ratio() >= MOST_OF_THE_WALLS {
+        let metres = agreement.details.on_open_floor;
+        return format!("the walls agree, but {metres:.0} m of furniture stand where the other map has open floor");
+    }
     if agreement.details.contradict() && agreement.inlier_ratio() >= MOST_OF_THE_WALLS {
         let WallLengths { inlier, conflict } = agreement.details.segments;
         return format!(
@@ -159,13 +165,13 @@ impl Refusal {
     pub fn headline(&self) -> String {
         match self {
             Self::RefusedUpstream(reason) => reason.clone(),
-            Self::Chance { agreement, .. } | Self::Contradiction { agreement }
+            Self::Chance { agreement, .. } | Self::Contradiction { agreement, .. }
                 if agreement.inlier_length < LITTLE_WALL =>
             {
                 "at no pose do the maps agree on more than a few metres of wall".to_owned()
             }
             Self::Chance { agreement, weakest, .. } => chance(agreement, *weakest),
-            Self::Contradiction { agreement } => contradiction(agreement),
+            Self::Contradiction { agreement, weakest } => contradiction(agreement, *weakest),
             Self::Ambiguous { listed: Listed(all), .. } if all.len() > 1 => {
                 format!("the maps fit at {} poses, and the evidence does not decide which is right", all.len())
             }
@@ -194,7 +200,7 @@ impl Refusal {
     pub fn advice(&self, b: &str) -> Option<String> {
         Some(match self {
             Self::RefusedUpstream(_) => return None,
-            Self::Contradiction { agreement } | Self::Chance { agreement, .. }
+            Self::Contradiction { agreement, .. } | Self::Chance { agreement, .. }
                 if agreement.inlier_length < LITTLE_WALL =>
             {
                 "let one robot drive where the other was, or let both see one tag".to_owned()
@@ -274,12 +280,18 @@ mod tests {
         let agreement = |inlier_length: f64| Agreement {
             inlier_length,
             conflict_length: 20.0,
-            details: Details { segments, ..Details::default() },
+            details: Details { segments, on_open_floor: 6.2, ..Details::default() },
             ..Agreement::default()
         };
-        let headline = |inlier_length: f64| Refusal::Contradiction { agreement: agreement(inlier_length) }.headline();
-        assert_eq!(headline(90.0), "the long walls agree, but of furniture and short walls 3 m do, 9 m do not");
-        assert_eq!(headline(25.0), "the maps contradict each other: 25 m of wall agree, 20 m do not");
+        let headline = |inlier_length: f64, weakest: Term| {
+            Refusal::Contradiction { agreement: agreement(inlier_length), weakest }.headline()
+        };
+        let details = "the long walls agree, but of furniture and short walls 3 m do, 9 m do not";
+        assert_eq!(headline(90.0, Term::ShortSegments), details);
+        let things = "the walls agree, but 6 m of furniture stand where the other map has open floor";
+        assert_eq!(headline(90.0, Term::ThingsOnOpenFloor), things);
+        let maps = "the maps contradict each other: 25 m of wall agree, 20 m do not";
+        assert_eq!(headline(25.0, Term::ThingsOnOpenFloor), maps);
     }
 
     #[test]

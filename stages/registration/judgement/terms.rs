@@ -32,8 +32,8 @@ pub enum Term {
     ConflictingWalls,
     /// Logarithm of the ratio of inliers to conflicts of short straight segments.
     ShortSegments,
-    /// Root of the cost of the deformation.
-    Deformation,
+    /// Logarithm of the length of the things of either map that stand on open floor of the other one.
+    ThingsOnOpenFloor,
 }
 
 impl Term {
@@ -46,7 +46,7 @@ impl Term {
         Self::Constraints,
         Self::ConflictingWalls,
         Self::ShortSegments,
-        Self::Deformation,
+        Self::ThingsOnOpenFloor,
     ];
 
     /// Name in the explanation of a decision and in the tables of the fit.
@@ -59,7 +59,7 @@ impl Term {
             Self::Constraints => "constraints in the weaker direction",
             Self::ConflictingWalls => "walls in conflict",
             Self::ShortSegments => "short pieces of wall",
-            Self::Deformation => "deformation",
+            Self::ThingsOnOpenFloor => "things on open floor",
         }
     }
 
@@ -71,7 +71,7 @@ impl Term {
             | Self::CommonArea
             | Self::Constraints
             | Self::ShortSegments => 1.0,
-            Self::Deviation | Self::ConflictingWalls | Self::Deformation => -1.0,
+            Self::Deviation | Self::ConflictingWalls | Self::ThingsOnOpenFloor => -1.0,
         }
     }
 }
@@ -82,13 +82,8 @@ pub struct Terms(pub [f64; COUNT]);
 
 impl Terms {
     /// Terms of a hypothesis with a peak significance and a margin over chance, the standard deviation of its position,
-    /// metres, the agreement of the maps, and the cost of the deformation of map b.
-    pub fn new(
-        (significance, margin): (f64, f64),
-        deviation: f64,
-        agreement: &Agreement,
-        deformation_cost: f64,
-    ) -> Self {
+    /// metres, and the agreement of the maps.
+    pub fn new((significance, margin): (f64, f64), deviation: f64, agreement: &Agreement) -> Self {
         let Agreement { overlap, conflicting_walls, independent_share, constraints, details, .. } = *agreement;
         let confirmed = (independent_share / FULL_SHARE).min(1.0);
         Self([
@@ -99,7 +94,7 @@ impl Terms {
             (constraints as f64).ln_1p(),
             (conflicting_walls as f64).ln_1p(),
             details.segments.log_ratio(),
-            deformation_cost.max(0.0).sqrt(),
+            details.on_open_floor.ln_1p(),
         ])
     }
 

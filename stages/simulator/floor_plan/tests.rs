@@ -6,8 +6,13 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 fn size() -> impl Strategy<Value = BuildingSize> {
-    let layout =
-        prop_oneof![Just(Layout::Random), Just(Layout::Symmetric), Just(Layout::Repeated), Just(Layout::Shelves)];
+    let layout = prop_oneof![
+        Just(Layout::Random),
+        Just(Layout::Symmetric),
+        Just(Layout::Repeated),
+        Just(Layout::Equipped),
+        Just(Layout::Shelves)
+    ];
     (10.0..45.0, 9.0..45.0, (2.5..8.0, 5.0..8.0), 1.4..3.0, 0.0..0.5, layout).prop_map(
         |(width, height, (room_width, room_depth), corridor_width, clutter, layout)| BuildingSize {
             width,
@@ -116,6 +121,37 @@ fn shelves_stand_in_rows_with_aisles_and_leave_every_door_clear() {
             assert!(shelves[..index].iter().all(|other| !other.expanded(1.1).overlaps(shelf)));
         }
     }
+}
+
+#[test]
+fn the_same_equipment_stands_in_every_room_of_a_size_in_every_building() {
+    let building = |rooms: f64, seed: u64| {
+        let size = BuildingSize {
+            width: rooms * 4.0,
+            height: 14.0,
+            room_width: 4.0,
+            room_depth: 6.0,
+            corridor_width: 2.0,
+            clutter: 0.0,
+            layout: Layout::Equipped,
+        };
+        FloorPlan::random(&size, &mut ChaCha8Rng::seed_from_u64(seed))
+    };
+    let seen_from_doors = |plan: &FloorPlan| -> Vec<Vec<(i32, i32)>> {
+        let centres = plan.rooms.iter().zip(&plan.furniture).map(|(room, furniture)| {
+            let door = room.doors[0].centre;
+            let from_door = |solid: &Solid| {
+                let centre = Rectangle::bounding(&solid.corners).unwrap().centre();
+                // In centimetres along the wall of the door, and into the room.
+                ((100.0 * (centre.x - door.x)).round() as i32, (100.0 * (centre.y - door.y).abs()).round() as i32)
+            };
+            plan.solids[furniture.clone()].iter().map(from_door).collect()
+        });
+        centres.collect()
+    };
+    let [small, large] = [building(4.0, 1), building(9.0, 2)].map(|plan| seen_from_doors(&plan));
+    assert!(small.len() == 8 && large.len() == 18 && small[0].len() > 1, "{small:?}");
+    assert!(small.iter().chain(&large).all(|room| *room == small[0]), "{small:?} {large:?}");
 }
 
 #[test]

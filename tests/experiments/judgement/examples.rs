@@ -5,6 +5,7 @@ use crate::map_pairs::judging::candidates_of;
 use crate::map_pairs::kinds::Kind;
 use crate::map_pairs::library::{self, Library, MapOfBuilding, SimulatedPair};
 use crate::map_pairs::truth::{self, Closeness};
+use crate::map_pairs::wards::{self, SAME_ROOMS, SameRooms, WARDS};
 use crate::map_pairs::worlds::Seeds;
 use anyhow::{Context, Result};
 use gridweave_runtime::stage::Registry;
@@ -20,12 +21,12 @@ use std::path::Path;
 /// Aliases are looked for where a place is more probable than this: only what may be accepted has any.
 const LIKELY: f64 = 0.5;
 
-/// Kinds of buildings whose parts are alike.
+/// Kinds of buildings whose parts are alike, of which there are more.
 const ALIKE: [Kind; 2] = [Kind::Symmetric, Kind::Repeated];
 
 /// What the pairs of simulated buildings of a kind are called.
-fn set_of(kind: Kind) -> String {
-    format!("simulated: {}", kind.name())
+fn set_of(kind: &str) -> String {
+    format!("simulated: {kind}")
 }
 
 /// Two maps, and the places that are judged.
@@ -87,9 +88,10 @@ impl Example {
         self.set.contains("simulated")
     }
 
-    /// Whether both robots were in one building whose parts are alike.
+    /// Whether the robots were in a building whose parts are alike, or in two whose rooms are the same.
     pub(super) fn has_parts_alike(&self) -> bool {
-        ALIKE.iter().any(|kind| self.set == set_of(*kind))
+        let kinds = ALIKE.map(Kind::name).into_iter().chain([WARDS]);
+        self.set == SAME_ROOMS || kinds.into_iter().any(|kind| self.set == set_of(kind))
     }
 
     /// Whether an alias is the right place.
@@ -142,13 +144,23 @@ pub(super) fn gather(args: &FitJudgementArgs, registry: &Registry) -> Result<Vec
         let more = library::simulated_pairs(count, Some(kind.name()), Seeds::Tuning, registry);
         worlds.extend(more.into_iter().filter(|pair| !numbers.contains(&pair.number)));
     }
-    let example = |pair: &SimulatedPair| {
+    let example = |pair: &SimulatedPair, place: &str| {
         let [a, b] = &pair.maps;
-        let set = set_of(pair.world.kind);
-        let names = [set.as_str(), pair.world.name.as_str(), a.building.as_str()];
+        let names = [&set_of(pair.kind()), pair.world.name.as_str(), place];
         Example::new(names, true, candidates_of(a, b, LIKELY), |place| pair.closeness(place))
     };
-    examples.extend(worlds.par_iter().map(example).collect::<Vec<_>>());
+    let of_world = |pair: &SimulatedPair| example(pair, &pair.maps[0].building);
+    examples.extend(worlds.par_iter().map(of_world).collect::<Vec<_>>());
+    let of_same_rooms = |SameRooms { name, buildings }: &SameRooms| {
+        let across = |robot: usize| {
+            let [a, b] = [0, 1].map(|building| &buildings[building].maps[robot]);
+            let pair = format!("{} and {}", a.name, b.name);
+            Example::new([SAME_ROOMS, &pair, name], false, candidates_of(a, b, LIKELY), |_| Closeness::Wrong)
+        };
+        [example(&buildings[0], name), example(&buildings[1], name), across(0), across(1)]
+    };
+    let same_rooms = wards::same_rooms(args.same_rooms, Seeds::Tuning, registry);
+    examples.extend(same_rooms.par_iter().flat_map_iter(of_same_rooms).collect::<Vec<_>>());
     let worlds = Library::of_worlds(worlds);
     examples.extend(of_different_buildings("different simulated buildings", &worlds, args.simulated, false, args.seed));
     Ok(examples)

@@ -34,6 +34,9 @@ pub(super) struct FitJudgementArgs {
     /// So many simulated worlds more of each kind whose parts are alike, for the aliases.
     #[arg(long, default_value_t = 120)]
     alike: u64,
+    /// Pairs of simulated buildings whose rooms are the same, down to their equipment, with two robots in each.
+    #[arg(long, default_value_t = 80)]
+    same_rooms: u64,
     /// Pairs of maps of different simulated worlds.
     #[arg(long, default_value_t = 1000)]
     simulated: u64,
@@ -54,9 +57,9 @@ pub(super) fn run(args: &FitJudgementArgs, registry: &Registry, results: &mut Re
         Some(file) => examples::read(file)?,
         None => examples::gather(args, registry)?,
     };
+    results.file("judgement_examples.jsonl", examples::to_lines(&examples)?.as_bytes())?;
     let judged = cross_validation::judge(&examples, args.folds)?;
     report::report(&examples, &judged, results)?;
-    results.file("judgement_examples.jsonl", examples::to_lines(&examples)?.as_bytes())?;
     let weights = fit::Weights::fit(&examples.iter().collect::<Vec<_>>())?;
     let source = report::weights_source(&weights, &examples);
     match &args.write {

@@ -52,6 +52,7 @@ impl Kind {
         let mut settings = vec!["robots=2".to_owned(), "tags=0".to_owned(), "snapshots=1".to_owned()];
         settings.extend(self.building(random));
         settings.extend(self.robot(random));
+        settings.push(format!("overlap={:.3}", random.random::<f64>()));
         settings
     }
 
@@ -89,7 +90,7 @@ impl Kind {
     }
 
     /// What the robots see by, how their poses drift, and how their maps are drawn.
-    fn robot(self, random: &mut impl Rng) -> Vec<String> {
+    pub(super) fn robot(self, random: &mut impl Rng) -> Vec<String> {
         let mut between = |low: f64, high: f64| low + (high - low) * random.random::<f64>();
         let is_large = matches!(self, Self::Hall | Self::Warehouse | Self::Campus);
         let has_camera = !is_large && between(0.0, 1.0) < 0.25;
@@ -117,7 +118,6 @@ impl Kind {
             format!("resolution={cells}"),
             format!("specks={specks:.5}"),
             format!("moved={moved:.2}"),
-            format!("overlap={:.3}", between(0.0, 1.0)),
         ];
         sensor.into_iter().chain(more).collect()
     }

@@ -176,7 +176,7 @@ pub(crate) struct SimulatedPair {
 }
 
 impl SimulatedPair {
-    fn of(world: PairWorld, number: u64) -> Option<Self> {
+    pub(super) fn of(world: PairWorld, number: u64) -> Option<Self> {
         let last = last_maps(&world.world.log).ok()?.into_iter();
         let mut maps = last.map(|(topic, map)| MapOfBuilding::new(format!("{number}-{}{topic}", world.name), map));
         let maps = [maps.next()?, maps.next()?];
@@ -185,7 +185,7 @@ impl SimulatedPair {
 
     /// The kind of building.
     pub(crate) fn kind(&self) -> &'static str {
-        self.world.kind.name()
+        self.world.kind
     }
 
     /// How near `T_a_b` is to the truth.

@@ -11,6 +11,7 @@ pub(crate) mod judging;
 pub(crate) mod kinds;
 pub(crate) mod library;
 pub(crate) mod truth;
+pub(crate) mod wards;
 pub(crate) mod worlds;
 
 use super::results::Results;
@@ -24,6 +25,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::path::PathBuf;
+use wards::{SAME_ROOMS, SameRooms};
 use worlds::Seeds;
 
 /// Arguments of the experiment `map-pairs`.
@@ -49,6 +51,10 @@ pub(super) struct MapPairsArgs {
     /// Pairs of maps of different simulated worlds.
     #[arg(long, default_value_t = 0)]
     simulated: u64,
+    /// Pairs of simulated buildings whose rooms are the same, down to their equipment, with two robots in each: the maps
+    /// of both robots, and with those of the other building.
+    #[arg(long, default_value_t = 0)]
+    same_rooms: u64,
     /// Seed of the pairs, parts and rotations.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -86,8 +92,10 @@ impl Trial {
 
 /// Does the experiment.
 pub(super) fn run(args: &MapPairsArgs, registry: &Registry, results: &mut Results) -> Result<()> {
-    if args.folders.is_empty() && args.worlds == 0 {
-        bail!("name a folder of maps, or a number of worlds (--worlds)");
+    if args.folders.is_empty() && args.worlds == 0 && args.same_rooms == 0 {
+        bail!(
+            "name a folder of maps, or a number of worlds (--worlds) or of buildings of the same rooms (--same-rooms)"
+        );
     }
     if args.simulated > 0 && args.worlds < 2 {
         bail!(
@@ -107,6 +115,8 @@ pub(super) fn run(args: &MapPairsArgs, registry: &Registry, results: &mut Result
     if !args.only_unrelated {
         trials.extend(pairs.par_iter().map(|pair| of_one_world(pair, args)).collect::<Vec<_>>());
     }
+    let same_rooms = wards::same_rooms(args.same_rooms, seeds, registry);
+    trials.extend(same_rooms.par_iter().flat_map_iter(|pair| of_same_rooms(pair, args)).collect::<Vec<_>>());
     // The sets by name, each in the order of its worlds.
     trials.sort_by(|one, other| one.set.cmp(&other.set));
     let worlds = Library::of_worlds(pairs);
@@ -151,6 +161,26 @@ fn of_one_world(pair: &SimulatedPair, args: &MapPairsArgs) -> Trial {
         wrong_maps: is_kept.then(|| (format!("world_{}", pair.number), pair.maps.clone())),
         judged,
     }
+}
+
+/// The robots of two buildings whose rooms are the same: those of each building, and those of both.
+fn of_same_rooms(SameRooms { buildings, .. }: &SameRooms, args: &MapPairsArgs) -> Vec<Trial> {
+    let across = |robot: usize| {
+        let [a, b] = [0, 1].map(|building| &buildings[building].maps[robot]);
+        let judged = judging::judge_maps(a, b);
+        let is_kept = args.keep_wrong && judged.is_merged();
+        Trial {
+            set: SAME_ROOMS.to_owned(),
+            pair: format!("{} and {}", a.name, b.name),
+            wrong_maps: is_kept.then(|| (format!("rooms_{}_{robot}", buildings[0].number), [a.clone(), b.clone()])),
+            is_right: false,
+            is_unrelated: true,
+            judged,
+        }
+    };
+    let within = |building: usize| of_one_world(&buildings[building], args);
+    let within = if args.only_unrelated { vec![] } else { vec![within(0), within(1)] };
+    within.into_iter().chain([across(0), across(1)]).collect()
 }
 
 /// Pairs of maps of different buildings; `in_parts` takes a part of each, turned.

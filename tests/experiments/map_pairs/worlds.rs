@@ -23,7 +23,7 @@ pub(crate) enum Seeds {
 
 impl Seeds {
     /// The seed of a world.
-    fn seed(self, number: u64) -> u64 {
+    pub(super) fn seed(self, number: u64) -> u64 {
         let first = match self {
             Self::Tuning => 150_000,
             Self::HeldOut => 700_050_000,
@@ -39,19 +39,24 @@ pub(crate) const ROBOTS: [&str; 2] = ["robot1", "robot2"];
 pub(crate) struct PairWorld {
     pub(crate) name: String,
     pub(crate) world: World,
-    pub(crate) kind: Kind,
+    /// The name of the kind of building.
+    pub(crate) kind: &'static str,
 }
 
 /// Two robots in a building of any kind. `None` if the robots find no way or see nothing there.
 pub(crate) fn varied(seeds: Seeds, number: u64, registry: &Registry) -> Option<PairWorld> {
     let seed = seeds.seed(number);
     let kind = Kind::of(number);
-    let settings = kind.settings(&mut ChaCha8Rng::seed_from_u64(seed));
-    let world = World::simulate(&settings, seed, registry).ok()?;
-    Some(PairWorld { name: format!("seed {seed}, {}", kind.name()), world, kind })
+    PairWorld::simulate(kind.name(), &kind.settings(&mut ChaCha8Rng::seed_from_u64(seed)), seed, registry)
 }
 
 impl PairWorld {
+    /// Two robots in a building of a kind. `None` if the robots find no way or see nothing there.
+    pub(super) fn simulate(kind: &'static str, settings: &[String], seed: u64, registry: &Registry) -> Option<Self> {
+        let world = World::simulate(settings, seed, registry).ok()?;
+        Some(Self { name: format!("seed {seed}, {kind}"), world, kind })
+    }
+
     /// Whether `T_a_b` is right by the world's truth.
     pub(crate) fn is_right(&self, robots: [&str; 2], transform_a_b: &Pose2) -> Result<bool> {
         Ok(is_place_right(&self.evaluation(robots, transform_a_b)?))
