@@ -7,7 +7,7 @@ use super::scan_usage::ScanUsage;
 use super::sessions::Sessions;
 use super::slam_map::{BadScans, LossCause, LostWay, SlamMap, TagSighting};
 use super::{ScanBeams, ScanMap, ScanMapperParameters, TooLarge};
-use crate::mapping::slam::Contradictions;
+use crate::mapping::slam::{Contradictions, OdometryCorrection};
 use crate::shared::geometry::{Point2, Pose2, pose};
 use crate::shared::robot_clock::RobotClock;
 use crate::shared::scan_grid::SnapshotMap;
@@ -217,11 +217,14 @@ impl Robot {
         }
     }
 
-    /// The factor and the turn to the left, radians, by which its ways by odometry become those by its scans, and the yaw of its
-    /// lidar as it is given. `None` if none is steady, or its scans are not registered along odometry.
-    pub(super) fn similarity_to_scans(&self) -> Option<(f64, f64, f64)> {
+    /// What turns its ways by odometry into those by its scans, and the yaw of its lidar as it is given, radians. `None` if it is
+    /// not steady, or its scans are not registered along odometry.
+    pub(super) fn odometry_correction(&self) -> Option<(OdometryCorrection, f64)> {
         match &self.localization {
-            Localization::ByOdometry(sessions) => sessions.first().similarity_to_scans(),
+            Localization::ByOdometry(sessions) => {
+                let first = sessions.first();
+                first.odometry_correction().map(|correction| (correction, first.lidar_yaw()))
+            }
             _ => None,
         }
     }

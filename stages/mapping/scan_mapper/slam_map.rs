@@ -1,7 +1,7 @@
 //! The map of a robot that has odometry only, or nothing but scans: its poses are found by SLAM.
 
 use super::{BaseBeam, ScanBeams, ScanMap, ScanMapperParameters};
-use crate::mapping::slam::{Contradictions, LocatedScan, ScanPoint, Trajectory, scan_points};
+use crate::mapping::slam::{Contradictions, LocatedScan, OdometryCorrection, ScanPoint, Trajectory, scan_points};
 use crate::shared::geometry::{Point2, Pose2, pose, wrap_angle};
 use crate::shared::scan_grid::SnapshotMap;
 use gridweave_runtime::message::LogTime;
@@ -126,11 +126,14 @@ impl SlamMap {
         self.trajectory.odometry_scale()
     }
 
-    /// The factor and the turn to the left, radians, by which the ways of the robot by odometry become those by its scans, and
-    /// the yaw of the lidar as it is given. `None` if none is steady.
-    pub(super) fn similarity_to_scans(&self) -> Option<(f64, f64, f64)> {
-        let (factor, turn) = self.trajectory.similarity_to_scans()?;
-        Some((factor, turn, self.scans.last()?.transform_base_lidar.rotation.angle()))
+    /// What turns the ways of the robot by odometry into those by its scans; `None` if it is not steady.
+    pub(super) fn odometry_correction(&self) -> Option<OdometryCorrection> {
+        self.trajectory.odometry_correction()
+    }
+
+    /// The yaw of the lidar on the robot as it is given, radians; 0 before the first scan.
+    pub(super) fn lidar_yaw(&self) -> f64 {
+        self.scans.last().map_or(0.0, |scan| scan.transform_base_lidar.rotation.angle())
     }
 
     /// Whether no scan has hit anything.

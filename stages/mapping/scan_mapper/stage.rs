@@ -310,13 +310,15 @@ fn explain(
     }
     if let Some(scale) = robot.odometry_scale().filter(|scale| (scale - 1.0).abs() > ODOMETRY_ERROR) {
         output.warn(wrong_scale(name, scale, "and is corrected by that"));
-    } else if let Some((scale, ..)) =
-        robot.similarity_to_scans().filter(|found| (found.0 - 1.0).abs() > MOST_SCALE_ERROR)
+    } else if let Some((correction, _)) =
+        robot.odometry_correction().filter(|(correction, _)| (correction.scale - 1.0).abs() > MOST_SCALE_ERROR)
     {
-        output.warn(wrong_scale(name, scale, "which is more than is corrected"));
+        output.warn(wrong_scale(name, correction.scale, "which is more than is corrected"));
     }
-    if let Some((_, turn, yaw)) = robot.similarity_to_scans().filter(|found| found.1.abs() > LIDAR_YAW_ERROR) {
-        output.warn(turned_lidar(name, turn, yaw));
+    if let Some((correction, yaw)) =
+        robot.odometry_correction().filter(|(correction, _)| correction.turn.abs() > LIDAR_YAW_ERROR)
+    {
+        output.warn(turned_lidar(name, correction.turn, yaw));
     }
     if let Some(scans) = robot.scans_at_a_standstill().filter(|scans| *scans >= SCANS_OF_A_DRIVE) {
         output.warn(format!(

@@ -41,7 +41,7 @@ pub use contradictions::{Contradictions, MAX_CONTRADICTING};
 pub use joint_trajectories::{FramedTrajectory, joint_contradictions, joint_poses};
 pub use local_map::LocalMap;
 pub use located_scan::LocatedScan;
-pub use odometry_noise::{MOST_SCALE_ERROR, OdometryNoise};
+pub use odometry_noise::{MOST_SCALE_ERROR, OdometryCorrection, OdometryNoise};
 pub use pose_graph::{Constraint, PoseGraph};
 pub use recorded_map::recorded_map;
 pub use scan_points::{ScanPoint, scan_points};

@@ -31,6 +31,15 @@ const SHOWN_BY_WALLS: f64 = 4.0;
 const LEAST_WAY: f64 = 5.0;
 const STEADY: f64 = 0.9;
 
+/// What turns the ways of a robot by odometry into those by its scans.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OdometryCorrection {
+    /// Length of the ways by scans as a share of that by odometry.
+    pub scale: f64,
+    /// Rotation of the ways, radians to the left, as where the lidar is mounted with another yaw than given.
+    pub turn: f64,
+}
+
 /// Ways between scans by odometry and by the walls, where these show them well.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct ComparedWays {
@@ -50,12 +59,14 @@ impl ComparedWays {
         self.products += Vector2::new(by_odometry.dot(by_walls), by_odometry.perp(by_walls));
     }
 
-    /// The similarity by which the ways by the walls are those by odometry: a factor, and a turn to the left, radians. `None` if
-    /// none is steady.
-    fn similarity(&self) -> Option<(f64, f64)> {
+    /// What turns the ways by odometry into those by the walls; `None` if it is not steady.
+    fn correction(&self) -> Option<OdometryCorrection> {
         let product = self.products.norm();
         let is_steady = self.way >= LEAST_WAY && product >= STEADY * (self.squares[0] * self.squares[1]).sqrt();
-        is_steady.then(|| (product / self.squares[0], self.products.y.atan2(self.products.x)))
+        is_steady.then(|| OdometryCorrection {
+            scale: product / self.squares[0],
+            turn: self.products.y.atan2(self.products.x),
+        })
     }
 }
 
@@ -93,10 +104,10 @@ impl OdometryNoise {
         self.ways[0] / self.ways[1]
     }
 
-    /// The factor and the turn to the left, radians, by which ways by odometry become those by the walls, where these show them
-    /// well; no step is left out. `None` if none is steady.
-    pub fn similarity_to_walls(&self) -> Option<(f64, f64)> {
-        self.compared.similarity()
+    /// What turns the ways by odometry into those by the walls, where these show them well; no step is left out. `None` if
+    /// it is not steady.
+    pub fn correction(&self) -> Option<OdometryCorrection> {
+        self.compared.correction()
     }
 
     /// A step of odometry with its way in the scale of the walls.
@@ -219,29 +230,29 @@ mod tests {
     #[test]
     fn a_lidar_that_is_turned_and_odometry_twice_as_long_are_noticed() {
         let well = Matrix3::identity() * 1e8;
-        let similarity = |turn: f64, factor: f64, slips: usize| {
+        let correction = |turn: f64, scale: f64, slips: usize| {
             let mut noise = OdometryNoise::new(0.1);
             for step in 0..60 {
                 let moved = pose(0.3, 0.02, if step % 2 == 0 { 0.3 } else { -0.3 });
-                let registered = nalgebra::UnitComplex::new(turn) * moved.translation.vector * factor;
+                let registered = nalgebra::UnitComplex::new(turn) * moved.translation.vector * scale;
                 let registered = if step < slips { Vector2::zeros() } else { registered };
                 let registered = Pose2::from_parts(registered.into(), moved.rotation);
                 noise.learn(&noise.corrected(&moved), &registered, &Matrix3::zeros(), &well);
-                assert!(step > 10 || noise.similarity_to_walls().is_none(), "a few steps tell nothing");
+                assert!(step > 10 || noise.correction().is_none(), "a few steps tell nothing");
             }
-            noise.similarity_to_walls().unwrap()
+            noise.correction().unwrap()
         };
-        for (turn, factor) in [(0.0, 1.0), (-1.5, 1.0), (3.0, 1.0), (0.2, 0.5)] {
-            let (found, turned) = similarity(turn, factor, 0);
-            assert!((found - factor).abs() < 1e-6 && (turned - turn).abs() < 1e-6, "{found} {turned}");
+        for (turn, scale) in [(0.0, 1.0), (-1.5, 1.0), (3.0, 1.0), (0.2, 0.5)] {
+            let found = correction(turn, scale, 0);
+            assert!((found.scale - scale).abs() < 1e-6 && (found.turn - turn).abs() < 1e-6, "{found:?}");
         }
-        let (found, turned) = similarity(0.0, 1.0, 6);
-        assert!(found > 0.85 && turned == 0.0, "{found} {turned}");
+        let found = correction(0.0, 1.0, 6);
+        assert!(found.scale > 0.85 && found.turn == 0.0, "{found:?}");
         // Along a corridor the walls do not show the way.
         let mut blind = OdometryNoise::new(0.1);
         let across = Matrix3::from_diagonal(&Vector3::new(0.0, 1e8, 1e8));
         (0..60).for_each(|_| blind.learn(&pose(0.3, 0.0, 0.0), &pose(0.1, 0.2, 0.0), &Matrix3::zeros(), &across));
-        assert_eq!(blind.similarity_to_walls(), None);
+        assert_eq!(blind.correction(), None);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::contradictions::{Contradictions, PlacedScan, find_contradictions};
 use super::local_map::LocalMap;
 use super::loop_closure::{Drive, Revisit, middle};
-use super::odometry_noise::OdometryNoise;
+use super::odometry_noise::{OdometryCorrection, OdometryNoise};
 use super::pose_graph::{Constraint, LandmarkSighting, PoseGraph, turned_information, yaw_information};
 use super::relocalization::find_loop_closures;
 use super::revisits::refine;
@@ -165,10 +165,9 @@ impl Trajectory {
         self.noise.scale()
     }
 
-    /// The factor and the turn to the left, radians, by which the ways of the robot by odometry become those by its scans.
-    /// `None` if none is steady.
-    pub fn similarity_to_scans(&self) -> Option<(f64, f64)> {
-        self.noise.similarity_to_walls()
+    /// What turns the ways of the robot by odometry into those by its scans; `None` if it is not steady.
+    pub fn odometry_correction(&self) -> Option<OdometryCorrection> {
+        self.noise.correction()
     }
 
     /// Length of the path of the robot by odometry, metres.
