@@ -1,18 +1,29 @@
 //! The receiver's state for its senders, independent of the network.
 //!
 //! It takes the batches of each sender in order, each once, and restores the original messages.
+//!
+//! The number of senders and what is kept for them are limited, for announced sessions apart from others: an honest
+//! sender announces its session, and does not compete with invented ones.
 
 use super::difference::{MAX_SIZE, message};
 use super::wire::{Answer, Batch, Entry, Form, Link, Outcome, from_bytes};
 use gridweave_runtime::message::{Channel, LogTime, MessageHeader};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// The maximum number of senders, and of bytes that are kept for all of them: their links, and their last messages.
-const MAX_SENDERS: usize = 1000;
-const MAX_KEPT: usize = 512 << 20;
+/// The limits for announced senders.
+const OF_ANNOUNCED: IngestLimits = IngestLimits { senders: 1000, kept: 512 << 20 };
+/// The limits for others. A sender is one of them until the network has told of its session.
+const OF_OTHERS: IngestLimits = IngestLimits { senders: 100, kept: 64 << 20 };
 /// The maximum size of the restored messages of a batch, bytes. They are in memory together.
 const MAX_RESTORED: usize = 512 << 20;
+
+/// The maximum number of senders, and of bytes that are kept for all of them: their links, and their last messages.
+#[derive(Clone, Copy, Debug)]
+struct IngestLimits {
+    senders: usize,
+    kept: usize,
+}
 
 /// An item of a batch.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,6 +60,8 @@ pub(super) struct Ingest {
     tolerance: i64,
     /// The senders by session.
     senders: BTreeMap<u64, Sender>,
+    /// The announced sessions.
+    announced: BTreeSet<u64>,
 }
 
 #[derive(Debug, Default)]
@@ -67,12 +80,18 @@ struct Sender {
 
 impl Ingest {
     pub(super) fn new(receiver: u64, tolerance: i64) -> Self {
-        Self { receiver, tolerance, senders: BTreeMap::new() }
+        Self { receiver, tolerance, senders: BTreeMap::new(), announced: BTreeSet::new() }
+    }
+
+    /// A session is announced until it is forgotten.
+    pub(super) fn announce(&mut self, session: u64) {
+        self.announced.insert(session);
     }
 
     /// Removes the state of a sender.
     pub(super) fn forget(&mut self, session: u64) {
         self.senders.remove(&session);
+        self.announced.remove(&session);
     }
 
     /// Takes a batch. Returns its contents, and the answer to send once these were forwarded.
@@ -101,7 +120,8 @@ impl Ingest {
         if batch.number == 0 {
             return self.take_handshake(batch);
         }
-        let room = MAX_KEPT.saturating_sub(self.kept());
+        let (limits, _, kept) = self.share_of(batch.session);
+        let room = limits.kept.saturating_sub(kept);
         let is_next = known == Some((batch.handshake, batch.number)) && batch.receiver == self.receiver;
         let Some(sender) = self.senders.get_mut(&batch.session).filter(|_| is_next) else {
             return Ok(Outcome::Unknown);
@@ -130,7 +150,8 @@ impl Ingest {
     fn take_handshake(&mut self, batch: Batch) -> Result<Outcome, String> {
         let links_size: usize = batch.links.iter().map(size_of).sum();
         let is_new = !self.senders.contains_key(&batch.session);
-        if (is_new && self.senders.len() >= MAX_SENDERS) || self.kept().saturating_add(links_size) > MAX_KEPT {
+        let (limits, senders, kept) = self.share_of(batch.session);
+        if (is_new && senders >= limits.senders) || kept.saturating_add(links_size) > limits.kept {
             return Err("there are too many senders, or they have too many links".to_owned());
         }
         let links = batch.links.into_iter().map(Arc::new).collect();
@@ -141,9 +162,12 @@ impl Ingest {
         Ok(Outcome::Taken)
     }
 
-    /// The number of bytes that are kept for all senders.
-    fn kept(&self) -> usize {
-        self.senders.values().map(Sender::kept).sum()
+    /// The limits for a session, and of those senders that share them the number, and the bytes that are kept.
+    fn share_of(&self, session: u64) -> (IngestLimits, usize, usize) {
+        let is_announced = self.announced.contains(&session);
+        let sharing = self.senders.iter().filter(|(other, _)| self.announced.contains(other) == is_announced);
+        let (senders, kept) = sharing.fold((0, 0), |(count, kept), (_, sender)| (count + 1, kept + sender.kept()));
+        (if is_announced { OF_ANNOUNCED } else { OF_OTHERS }, senders, kept)
     }
 }
 

@@ -212,6 +212,7 @@ impl BridgeSource {
     fn note_sender(&mut self, sender: Presence, is_present: bool, output: &Output<Ports>) {
         let name = sender.name.clone();
         if is_present {
+            self.ingest.announce(sender.number);
             self.absent.remove(&sender).into_iter().for_each(|session| self.ingest.forget(session));
             let is_other =
                 |other: &Presence| other.name == name && *other != sender && !self.ended.contains(&other.number);

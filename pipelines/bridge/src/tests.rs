@@ -93,6 +93,7 @@ fn what_a_few_bytes_expand_to_is_limited_for_a_batch_and_for_all_senders() {
         (answer.outcome, taken.items.len(), taken.wrong.unwrap_or_default())
     };
     let handshake = |session| forged(session, 0, links(), Vec::new());
+    ingest.announce(1);
     assert_eq!(outcome(&mut ingest, &handshake(1)).0, Outcome::Taken);
     // A batch in which each of a thousand entries expands to a large message.
     let many = forged(1, 1, Vec::new(), (0..1000).map(|number| entry(&format!("/{number}"))).collect());
@@ -102,15 +103,21 @@ fn what_a_few_bytes_expand_to_is_limited_for_a_batch_and_for_all_senders() {
     // Batches of which each has one, kept for the next difference.
     let mut taken = 0;
     for session in 2..12 {
+        ingest.announce(session);
         assert_eq!(outcome(&mut ingest, &handshake(session)).0, Outcome::Taken);
         let (outcome, _, wrong) = outcome(&mut ingest, &forged(session, 1, Vec::new(), vec![entry("/map")]));
         taken += usize::from(outcome == Outcome::Taken);
         assert!(outcome == Outcome::Taken || wrong.contains("too many large messages"), "{wrong}");
     }
     assert_eq!(taken, 5, "512 MB of them");
-    // Senders without end, or with links without end.
+    // Invented senders without end, which leave room for announced ones.
     let full = (20..2000).filter(|session| outcome(&mut ingest, &handshake(*session)).0 != Outcome::Taken).count();
-    assert!(full > 900, "{full}");
+    assert!(full > 1800, "{full}");
+    ingest.announce(2000);
+    assert_eq!(outcome(&mut ingest, &handshake(2000)).0, Outcome::Taken);
+    ingest.forget(2000);
+    assert_eq!(outcome(&mut ingest, &handshake(2000)).0, Outcome::Unreadable);
+    // Links without end.
     let links = vec![Link::default(); 100_000];
     assert_eq!(outcome(&mut Ingest::new(1, SECOND), &forged(1, 0, links, Vec::new())).0, Outcome::Unreadable);
 }
